@@ -1,0 +1,208 @@
+"""Cloud: coordinates and what belongs to them, and the one door where arrays are checked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Cloud:
+    """A point cloud: coordinates, attributes, and what its file said about it.
+
+    Attributes
+    ----------
+    xyz : (N, 3) float64
+        Coordinates in the cloud's own unit and frame; NaN or inf where an organized sensor saw nothing.
+    attributes : mapping of str to (N,) or (N, C) array
+        Everything else known per point, by the name its file gave it (``intensity``, ``red``, ``label``...).
+    shape : (int, int) or None
+        Rows and columns of an organized cloud (``N == rows * columns``, row-major), None when unorganized.
+    viewpoint : (3,) float64 or None
+        Where the sensor stood, in the cloud's frame, when that is known.
+    crs : str or None
+        Coordinate reference system as WKT (or ``EPSG:n``), when the file carried one.
+    metadata : mapping
+        What a format needs to write the cloud back as it was (LAS scales and offsets, comments...).
+
+    Examples
+    --------
+    >>> import numpy as np, edgel
+    >>> cloud = edgel.Cloud(np.eye(3), {"intensity": np.array([1, 2, 3], np.uint16)})
+    >>> len(cloud), cloud.is_organized
+    (3, False)
+    """
+
+    xyz: np.ndarray
+    attributes: Mapping[str, np.ndarray] = field(default_factory=dict)
+    shape: tuple[int, int] | None = None
+    viewpoint: np.ndarray | None = None
+    crs: str | None = None
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        xyz = _coordinates(self.xyz)
+        shape = self.shape
+        if xyz.ndim == 3:
+            shape = xyz.shape[:2] if shape is None else shape
+            xyz = xyz.reshape(-1, 3)
+        if shape is not None and shape[0] * shape[1] != len(xyz):
+            raise ValueError(f"shape {tuple(shape)} of an organized cloud does not hold its {len(xyz)} points")
+        attributes = {}
+        for name, values in self.attributes.items():
+            array = np.asarray(values)
+            if array.ndim == 0 or len(array) != len(xyz):
+                raise ValueError(f"attribute {name!r} has shape {array.shape}; its first axis must be {len(xyz)} long")
+            attributes[name] = array
+        viewpoint = None if self.viewpoint is None else as_vector(self.viewpoint, "viewpoint")
+        object.__setattr__(self, "xyz", xyz)
+        object.__setattr__(self, "attributes", MappingProxyType(attributes))
+        object.__setattr__(self, "shape", None if shape is None else (int(shape[0]), int(shape[1])))
+        object.__setattr__(self, "viewpoint", viewpoint)
+        object.__setattr__(self, "metadata", MappingProxyType(dict(self.metadata)))
+
+    def __len__(self) -> int:
+        return len(self.xyz)
+
+    def __repr__(self) -> str:
+        form = f"organized {self.shape[0]} x {self.shape[1]}" if self.shape else "unorganized"
+        names = ", ".join(self.attributes) or "none"
+        return f"Cloud({len(self):,} points, {form}; attributes: {names})"
+
+    @property
+    def is_organized(self) -> bool:
+        """Whether the points form a grid of rows and columns, as a camera makes them."""
+        return self.shape is not None
+
+    def take(self, rows: np.ndarray) -> Cloud:
+        """Return the cloud of the given rows (int or bool (N,)) with all their attributes; no longer organized."""
+        return replace(
+            self,
+            xyz=self.xyz[rows],
+            attributes={name: values[rows] for name, values in self.attributes.items()},
+            shape=None,
+        )
+
+    def with_attributes(self, **attributes: np.ndarray) -> Cloud:
+        """Return the same cloud with these attributes added, or replaced where the name exists."""
+        return replace(self, attributes={**self.attributes, **attributes})
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """What the kernels work on: the finite points of an input and where they came from.
+
+    Attributes
+    ----------
+    xyz : (M, 3) float64, C-contiguous
+        Finite coordinates.
+    rows : (M,) int64
+        Row of the input (flat when organized) of each of them, ascending.
+    num_input : int
+        Number of points that came in, finite or not.
+    """
+
+    xyz: np.ndarray
+    rows: np.ndarray
+    num_input: int
+
+    @property
+    def num_dropped(self) -> int:
+        """Number of points left out because a coordinate was NaN or infinite."""
+        return self.num_input - len(self.rows)
+
+
+def as_cloud(points: Any) -> Cloud:
+    """Make a Cloud of anything that carries points.
+
+    Parameters
+    ----------
+    points : Cloud, (N, 3) or (H, W, 3) array_like, or an object with ``.xyz`` or ``.points``
+        Objects of laspy (``.xyz``), Open3D and PyVista (``.points``) are understood.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If it carries no numeric coordinates of shape (N, 3) or (H, W, 3).
+    """
+    if isinstance(points, Cloud):
+        return points
+    for attribute in ("xyz", "points"):
+        if not isinstance(points, np.ndarray) and hasattr(points, attribute):
+            return Cloud(np.asarray(getattr(points, attribute)))
+    return Cloud(points)
+
+
+def check_points(points: Any, *, minimum: int = 3) -> Points:
+    """Check the input of a public function and keep its finite points.
+
+    Parameters
+    ----------
+    points : see `as_cloud`
+    minimum : int
+        How many finite points the caller needs at least.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If `points` carries no coordinates, or fewer than `minimum` finite ones.
+    """
+    xyz = as_cloud(points).xyz
+    # A sum is finite only if all its terms are: one pass, no (N, 3) mask for the usual clean cloud.
+    if np.isfinite(xyz.sum()):
+        rows = np.arange(len(xyz))
+    else:
+        rows = np.flatnonzero(np.isfinite(xyz).all(axis=1))
+        xyz = xyz if len(rows) == len(xyz) else xyz[rows]
+    if len(rows) < minimum:
+        found = f"{len(rows)} finite points of {len(as_cloud(points))}" if len(rows) < len(as_cloud(points)) else len(rows)
+        raise ValueError(f"points: needs at least {minimum} points with finite coordinates, got {found}")
+    return Points(np.ascontiguousarray(xyz), rows, len(as_cloud(points)))
+
+
+def check_rows(at: Any, num_points: int) -> np.ndarray:
+    """Check row numbers (int) or a mask (bool, (N,)) of a cloud and return them as (M,) int64."""
+    rows = np.asarray(at)
+    if rows.ndim == 1 and rows.dtype == bool:
+        if len(rows) != num_points:
+            raise ValueError(f"at: a mask of {len(rows)} for {num_points} points; give one flag a point")
+        return np.flatnonzero(rows)
+    if rows.ndim != 1 or (rows.size and rows.dtype.kind not in "iu"):
+        raise TypeError(f"at: expected (M,) row numbers or an (N,) mask, got {rows.dtype} of shape {rows.shape}")
+    rows = rows.astype(np.int64)
+    if rows.size and (rows.min() < 0 or rows.max() >= num_points):
+        raise ValueError(f"at: rows must lie in 0..{num_points - 1}, got {rows.min()}..{rows.max()}")
+    return rows
+
+
+def as_vector(value: Any, name: str) -> np.ndarray:
+    """Check a finite (3,) vector and return it as float64."""
+    vector = np.asarray(value, dtype=np.float64)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise ValueError(f"{name}: expected three finite numbers, got {value!r}")
+    return vector
+
+
+def _coordinates(xyz: Any) -> np.ndarray:
+    array = np.asarray(xyz)
+    if array.dtype.kind not in "fiu":
+        raise TypeError(f"points: expected numbers of shape (N, 3) or (H, W, 3), got {type(xyz).__name__} ({array.dtype})")
+    if array.ndim not in (2, 3) or array.shape[-1] != 3:
+        raise ValueError(f"points: expected shape (N, 3) or (H, W, 3), got {array.shape}{_remedy(array)}")
+    return array.astype(np.float64, copy=False)
+
+
+def _remedy(array: np.ndarray) -> str:
+    if array.ndim == 2 and array.shape[0] == 3:
+        return "; coordinates are in its rows: pass points.T"
+    if array.ndim == 2 and array.shape[1] == 2:
+        return "; z is missing: pass np.column_stack([points, np.zeros(len(points))]) for a flat cloud"
+    if array.ndim == 2 and array.shape[1] > 3:
+        return "; pass the coordinates alone, points[:, :3]"
+    if array.ndim == 1:
+        return "; for one point pass points[None, :]"
+    return ""

@@ -1,0 +1,62 @@
+"""Compile kernels and run them over slices from one thread pool.
+
+Kernels release the GIL and take ``(start, stop, ...)``; slices of fixed size keep the result independent of the number
+of threads. A pool of our own is safe when called from several threads, where Numba's own layer aborts the process.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from typing import Any, TypeVar
+
+from numba import njit
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def kernel(function: F) -> F:
+    """Compile a function to machine code, without the GIL, kept on disk between runs."""
+    return njit(nogil=True, cache=True)(function)  # pyright: ignore[reportReturnType]
+
+
+def num_threads() -> int:
+    """Return how many threads kernels use: ``EDGEL_NUM_THREADS``, or the cores this process may run on."""
+    asked = os.environ.get("EDGEL_NUM_THREADS", "")
+    if asked and (not asked.isdigit() or int(asked) == 0):
+        raise ValueError(f"EDGEL_NUM_THREADS={asked!r}: expected a whole number above 0")
+    return int(asked) if asked else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(threads, thread_name_prefix="edgel")
+
+
+def run_slices(compiled: Callable[..., Any], count: int, *arguments: Any, size: int = 8192) -> None:
+    """Call ``compiled(start, stop, *arguments)`` for consecutive slices of ``range(count)``, in parallel.
+
+    Parameters
+    ----------
+    compiled : kernel
+        Writes its result into arrays among `arguments`, each slice to its own part.
+    count : int
+        Length of the range that is sliced.
+    size : int
+        Length of a slice; depends on the work, never on the number of threads.
+    """
+    starts = range(0, count, size)
+    if not starts:
+        return
+    # The first slice runs alone: it compiles the kernel, which two threads would otherwise do twice.
+    compiled(0, min(size, count), *arguments)
+    threads = num_threads()
+    if threads == 1 or len(starts) < 3:
+        for start in starts[1:]:
+            compiled(start, min(start + size, count), *arguments)
+        return
+    jobs = [_pool(threads).submit(compiled, start, min(start + size, count), *arguments) for start in starts[1:]]
+    for job in jobs:
+        job.result()
