@@ -213,7 +213,7 @@ def _nearest_segments(start, stop, xyz, begin, end, tree, segment, fraction):
             top -= 1
             node = stack[top]
             # The slack keeps rounding from hiding an equally near segment, so the order of points cannot matter.
-            if _box_distance2(tree, node, x, y, z) > best * (1.0 + 1e-12):
+            if _box_distance2(tree, node, x, y, z) > best * (1.0 + 1e-12) + 1e-24:
                 continue
             if node < leaves:
                 stack[top] = 2 * node + 1

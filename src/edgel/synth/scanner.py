@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -63,9 +63,19 @@ class Scan:
         """The nearest true edge of each noise-free hit: curve, foot, distance, dihedral."""
         return nearest_edge(self.hits, self.part.edges)
 
+    @cached_property
+    def nearest_seen(self) -> NearestEdge:
+        """The same as the viewer sees it, in x and y alone: distances are those in the projection, feet have z = 0."""
+        flat = [replace(edge, points=edge.points * (1.0, 1.0, 0.0)) for edge in self.part.edges]
+        return nearest_edge(self.cloud.xyz * (1.0, 1.0, 0.0), flat)
+
     @property
     def edge_distance(self) -> np.ndarray:
-        """Distance in 3D from the noise-free hit to the nearest true edge, (N,), mm."""
+        """Distance in 3D from the noise-free hit to the nearest true edge, (N,), mm.
+
+        At a silhouette the surface is steep: a ray that passes it by d hits about ``sqrt(2 r d)`` away from it, many
+        pitches. To mark the points along a silhouette take ``nearest_seen.distance``.
+        """
         return self.nearest.distance
 
     @property
