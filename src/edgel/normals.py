@@ -1,0 +1,247 @@
+"""Surface normals by plane fits to the nearest neighbours, at all points or only where they are asked for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from edgel.cloud import as_cloud, as_vector, check_points, check_rows
+from edgel.kdtree import BUCKET, NeighborIndex, build_index, node_start
+from edgel.neighbors import knn_chunk, run_chunks
+from edgel.parallel import kernel
+
+# Below this share of the largest variance the middle one is rounding: the neighbours lie on a line, or on one spot.
+_FLAT = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Normals:
+    """Best-fit planes ``normal . p = offset`` of the points asked for, in their order.
+
+    Attributes
+    ----------
+    normals : (M, 3) float64
+        Unit normals; NaN where the neighbours span no plane or the point itself is not finite.
+    offset : (M,) float64
+        D of the paper's eq. 20, the plane's signed distance from the origin, in the cloud's unit.
+    residual : (M,) float64
+        e of eq. 20, the sum of squared distances of the neighbours to the plane, in the cloud's unit squared.
+    variation : (M,) float64
+        Surface variation, smallest over summed variance (Pauly et al. 2002): 0 on a plane, 1/3 at most.
+    """
+
+    normals: np.ndarray
+    offset: np.ndarray
+    residual: np.ndarray
+    variation: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.normals)
+
+    @property
+    def num_undefined(self) -> int:
+        """Number of points without a normal."""
+        return int(np.isnan(self.offset).sum())
+
+    def flipped(self, where: np.ndarray) -> Normals:
+        """Return the same planes with the normals of a (M,) mask turned round."""
+        sign = np.where(where, -1.0, 1.0)
+        return replace(self, normals=self.normals * sign[:, None], offset=self.offset * sign)
+
+
+def estimate_normals(
+    points: Any, *, at: Any = None, num_neighbors: int = 16, viewpoint: Any = None
+) -> Normals:
+    """Fit a plane to the k nearest neighbours of each point, or only of the points `at`.
+
+    Parameters
+    ----------
+    points : (N, 3) or (H, W, 3) array_like, Cloud, or an object that carries points
+        Neighbours are searched among all of its finite points, exactly.
+    at : (M,) int or (N,) bool, optional
+        Rows of the points whose normals are wanted; default all.
+    num_neighbors : int
+        k, the point itself among them; at least 3. Fewer are used when the cloud has fewer.
+    viewpoint : (3,) array_like, optional
+        Normals are turned towards it. Default: the sensor's position when the cloud knows it, else from above (+Z).
+
+    Returns
+    -------
+    Normals
+        One row a point asked for; the same whatever the order of the points and the number of threads.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If `points` carries no coordinates or fewer than 3 finite ones, or an option is out of its range.
+
+    Notes
+    -----
+    Total least squares as in eq. 20 of the paper: the eigenvector of the smallest eigenvalue of the neighbours' scatter
+    matrix.
+
+    Examples
+    --------
+    >>> import numpy as np, edgel
+    >>> x, y = np.meshgrid(np.arange(10.0), np.arange(10.0))
+    >>> edgel.estimate_normals(np.c_[x.ravel(), y.ravel(), 0 * x.ravel()], at=[44]).normals
+    array([[0., 0., 1.]])
+    """
+    cloud = as_cloud(points)
+    if viewpoint is None:
+        viewpoint = cloud.viewpoint
+    viewpoint = None if viewpoint is None else as_vector(viewpoint, "viewpoint")
+    checked = check_points(cloud)
+    index = build_index(checked.xyz)
+    if at is None and checked.num_dropped == 0:
+        return towards(fit_planes(index, index, check_num_neighbors(num_neighbors, len(index))), checked.xyz, viewpoint)
+    rows = np.arange(len(cloud)) if at is None else check_rows(at, len(cloud))
+    wanted = np.isfinite(cloud.xyz[rows]).all(axis=1)
+    xyz = cloud.xyz[rows[wanted]]
+    planes = plane_fits(index, xyz, num_neighbors)
+    return _spread(towards(planes, xyz, viewpoint), wanted)
+
+
+def check_num_neighbors(num_neighbors: int, num_points: int) -> int:
+    """Check k of a plane fit and return how many neighbours a cloud of `num_points` can give."""
+    if not isinstance(num_neighbors, int | np.integer) or num_neighbors < 3:
+        raise ValueError(f"num_neighbors: a plane needs at least 3, got {num_neighbors!r}")
+    return min(int(num_neighbors), num_points)
+
+
+def plane_fits(index: NeighborIndex, xyz: np.ndarray, num_neighbors: int) -> Normals:
+    """Fit planes to the k nearest neighbours of (M, 3) finite positions; the normals' signs are arbitrary."""
+    k = check_num_neighbors(num_neighbors, len(index))
+    if len(xyz) == 0:
+        return Normals(np.empty((0, 3)), np.empty(0), np.empty(0), np.empty(0))
+    return fit_planes(index, build_index(xyz, index.origin), k)
+
+
+def fit_planes(index: NeighborIndex, queries: NeighborIndex, num_neighbors: int) -> Normals:
+    """Fit planes at sorted queries, which may be the index itself; results in the queries' own order."""
+    planes = np.empty((len(queries), 6))
+    run_chunks(_fit_planes, queries, index, num_neighbors, index.origin, planes)
+    normals = np.ascontiguousarray(planes[:, :3])
+    return Normals(normals, planes[:, 3].copy(), planes[:, 4].copy(), planes[:, 5].copy())
+
+
+def towards(planes: Normals, xyz: np.ndarray, viewpoint: np.ndarray | None) -> Normals:
+    """Turn the normals at (M, 3) positions towards a viewpoint (3,), or upwards (+Z) when it is None."""
+    if viewpoint is None:
+        n = planes.normals
+        # A vertical face is seen from no side from above: then +Y, then +X decides, so that the sign is not left to
+        # rounding in the eigenvector.
+        down = (n[:, 2] < 0) | ((n[:, 2] == 0) & ((n[:, 1] < 0) | ((n[:, 1] == 0) & (n[:, 0] < 0))))
+        return planes.flipped(down)
+    return planes.flipped(((viewpoint - xyz) * planes.normals).sum(axis=1) < 0)
+
+
+def by_offset(planes: Normals) -> Normals:
+    """Turn the normals so that ``D > 0``, the orientation of the paper (eq. 20)."""
+    return planes.flipped(planes.offset < 0)
+
+
+def _spread(planes: Normals, wanted: np.ndarray) -> Normals:
+    """Put planes into the rows of a mask, NaN elsewhere."""
+    if wanted.all():
+        return planes
+    full = {}
+    for name in ("normals", "offset", "residual", "variation"):
+        values = getattr(planes, name)
+        full[name] = np.full((len(wanted), *values.shape[1:]), np.nan)
+        full[name][wanted] = values
+    return Normals(**full)
+
+
+@kernel
+def smallest_eigenpair(xx, xy, xz, yy, yz, zz):
+    """Return the smallest and the middle eigenvalue of a symmetric 3 x 3 matrix, and the smallest's unit eigenvector.
+
+    Closed form (Smith 1961, doi:10.1145/355578.366316), then Rayleigh quotients, which undo the rounding of the arccos.
+    """
+    mean = (xx + yy + zz) / 3.0
+    dx, dy, dz = xx - mean, yy - mean, zz - mean
+    p = math.sqrt((dx * dx + dy * dy + dz * dz + 2.0 * (xy * xy + xz * xz + yz * yz)) / 6.0)
+    if p == 0.0:
+        return mean, mean, 0.0, 0.0, 1.0
+    det = dx * (dy * dz - yz * yz) - xy * (xy * dz - yz * xz) + xz * (xy * yz - dy * xz)
+    angle = math.acos(min(max(det / (2.0 * p * p * p), -1.0), 1.0)) / 3.0
+    smallest = mean + 2.0 * p * math.cos(angle + 2.0943951023931953)
+    middle = 3.0 * mean - smallest - (mean + 2.0 * p * math.cos(angle))
+    x, y, z = _orthogonal_to_largest(xx - smallest, xy, xz, yy - smallest, yz, zz - smallest)
+    for _ in range(3):
+        a, b, c = xx - smallest, yy - smallest, zz - smallest
+        # Every column of the adjugate of A - lambda I points along the eigenvector; the longest is the safest.
+        ax, ay, az = b * c - yz * yz, a * c - xz * xz, a * b - xy * xy
+        kxy, kxz, kyz = xz * yz - xy * c, xy * yz - xz * b, xy * xz - yz * a
+        if abs(ax) >= abs(ay) and abs(ax) >= abs(az):
+            u, v, w = ax, kxy, kxz
+        elif abs(ay) >= abs(az):
+            u, v, w = kxy, ay, kyz
+        else:
+            u, v, w = kxz, kyz, az
+        length = math.sqrt(u * u + v * v + w * w)
+        if length <= 1e-14 * p * p:  # the two smallest are equal: any direction across the largest will do
+            break
+        x, y, z = u / length, v / length, w / length
+        smallest = x * (xx * x + xy * y + xz * z) + y * (xy * x + yy * y + yz * z) + z * (xz * x + yz * y + zz * z)
+    return smallest, middle, x, y, z
+
+
+@kernel
+def _orthogonal_to_largest(a, xy, xz, b, yz, c):
+    """Return a unit vector across the longest row of a symmetric matrix (its largest eigenvector when its rank is 1)."""
+    u, v, w = a, xy, xz
+    if b * b + yz * yz + xy * xy > u * u + v * v + w * w:
+        u, v, w = xy, b, yz
+    if c * c + yz * yz + xz * xz > u * u + v * v + w * w:
+        u, v, w = xz, yz, c
+    if abs(u) <= abs(v) and abs(u) <= abs(w):
+        x, y, z = 0.0, w, -v
+    elif abs(v) <= abs(w):
+        x, y, z = -w, 0.0, u
+    else:
+        x, y, z = v, -u, 0.0
+    length = math.sqrt(x * x + y * y + z * z)
+    if length == 0.0:
+        return 0.0, 0.0, 1.0
+    return x / length, y / length, z / length
+
+
+@kernel
+def _fit_planes(start, stop, leaves, queries, query_order, xyz, order, boxes, k, origin, planes):
+    best, rows = np.empty((BUCKET, k)), np.empty((BUCKET, k), np.int64)
+    stack, reaches, distances = np.empty(64, np.int64), np.empty(64), np.empty(BUCKET)
+    for leaf in range(start, stop):
+        first = node_start(leaf, queries.shape[1], leaves)
+        count = node_start(leaf + 1, queries.shape[1], leaves) - first
+        knn_chunk(queries, first, count, xyz, order, boxes, k, best, rows, stack, reaches, distances)
+        for q in range(count):
+            # Sums are taken about the query, so that they keep their digits far from the origin.
+            x, y, z = queries[0, first + q], queries[1, first + q], queries[2, first + q]
+            mx, my, mz = 0.0, 0.0, 0.0
+            for i in range(k):
+                mx += xyz[0, rows[q, i]] - x
+                my += xyz[1, rows[q, i]] - y
+                mz += xyz[2, rows[q, i]] - z
+            mx, my, mz = mx / k, my / k, mz / k
+            xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            for i in range(k):
+                dx = xyz[0, rows[q, i]] - x - mx
+                dy = xyz[1, rows[q, i]] - y - my
+                dz = xyz[2, rows[q, i]] - z - mz
+                xx, xy, xz = xx + dx * dx, xy + dx * dy, xz + dx * dz
+                yy, yz, zz = yy + dy * dy, yz + dy * dz, zz + dz * dz
+            smallest, middle, nx, ny, nz = smallest_eigenpair(xx, xy, xz, yy, yz, zz)
+            trace = xx + yy + zz
+            plane = planes[query_order[first + q]]
+            if middle <= _FLAT * trace:
+                plane[:] = np.nan
+                continue
+            plane[0], plane[1], plane[2] = nx, ny, nz
+            plane[3] = nx * (x + mx + origin[0]) + ny * (y + my + origin[1]) + nz * (z + mz + origin[2])
+            plane[4] = max(smallest, 0.0)
+            plane[5] = max(smallest, 0.0) / trace
