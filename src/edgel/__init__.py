@@ -1,5 +1,9 @@
 """Find the edges of 3D point clouds, and their normals, without tuning."""
 
+from edgel import paper
 from edgel.cloud import Cloud
+from edgel.detect import detect
+from edgel.edges import EdgeKind, Edges
+from edgel.normals import Normals, estimate_normals
 
-__all__ = ["Cloud"]
+__all__ = ["Cloud", "EdgeKind", "Edges", "Normals", "detect", "estimate_normals", "paper"]

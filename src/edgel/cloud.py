@@ -159,7 +159,9 @@ def check_points(points: Any, *, minimum: int = 3) -> Points:
         rows = np.flatnonzero(np.isfinite(xyz).all(axis=1))
         xyz = xyz if len(rows) == len(xyz) else xyz[rows]
     if len(rows) < minimum:
-        found = f"{len(rows)} finite points of {len(as_cloud(points))}" if len(rows) < len(as_cloud(points)) else len(rows)
+        found = (
+            f"{len(rows)} finite points of {len(as_cloud(points))}" if len(rows) < len(as_cloud(points)) else len(rows)
+        )
         raise ValueError(f"points: needs at least {minimum} points with finite coordinates, got {found}")
     return Points(np.ascontiguousarray(xyz), rows, len(as_cloud(points)))
 
@@ -190,7 +192,9 @@ def as_vector(value: Any, name: str) -> np.ndarray:
 def _coordinates(xyz: Any) -> np.ndarray:
     array = np.asarray(xyz)
     if array.dtype.kind not in "fiu":
-        raise TypeError(f"points: expected numbers of shape (N, 3) or (H, W, 3), got {type(xyz).__name__} ({array.dtype})")
+        raise TypeError(
+            f"points: expected numbers of shape (N, 3) or (H, W, 3), got {type(xyz).__name__} ({array.dtype})"
+        )
     if array.ndim not in (2, 3) or array.shape[-1] != 3:
         raise ValueError(f"points: expected shape (N, 3) or (H, W, 3), got {array.shape}{_remedy(array)}")
     return array.astype(np.float64, copy=False)

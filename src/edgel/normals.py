@@ -52,9 +52,7 @@ class Normals:
         return replace(self, normals=self.normals * sign[:, None], offset=self.offset * sign)
 
 
-def estimate_normals(
-    points: Any, *, at: Any = None, num_neighbors: int = 16, viewpoint: Any = None
-) -> Normals:
+def estimate_normals(points: Any, *, at: Any = None, num_neighbors: int = 16, viewpoint: Any = None) -> Normals:
     """Fit a plane to the k nearest neighbours of each point, or only of the points `at`.
 
     Parameters

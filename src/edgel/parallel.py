@@ -27,7 +27,13 @@ def num_threads() -> int:
     asked = os.environ.get("EDGEL_NUM_THREADS", "")
     if asked and (not asked.isdigit() or int(asked) == 0):
         raise ValueError(f"EDGEL_NUM_THREADS={asked!r}: expected a whole number above 0")
-    return int(asked) if asked else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return (
+        int(asked)
+        if asked
+        else len(os.sched_getaffinity(0))
+        if hasattr(os, "sched_getaffinity")
+        else os.cpu_count() or 1
+    )
 
 
 @cache

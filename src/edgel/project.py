@@ -1,0 +1,187 @@
+"""From points to a raster and back: the vertical projection of the paper (steps 1-3) and its inverse (step 8).
+
+Rasters are ``[row, col]``; row 0 lies at the smallest y. The paper counts columns i and rows j from 1, the code from 0.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from edgel.parallel import kernel, run_slices
+
+
+@dataclass(frozen=True)
+class PixelGrid:
+    """Where the pixels of a vertical projection lie in the cloud's x and y.
+
+    Attributes
+    ----------
+    width, height : int
+        Number of columns (x) and rows (y).
+    lower, upper : (3,) float64
+        Corners of the cloud's bounding box, in its unit.
+    """
+
+    width: int
+    height: int
+    lower: np.ndarray
+    upper: np.ndarray
+
+    @property
+    def pixel(self) -> tuple[float, float]:
+        """Size of a pixel along x and y, in the cloud's unit."""
+        extent = self.upper - self.lower
+        return float(extent[0] / self.width), float(extent[1] / self.height)
+
+
+@dataclass(frozen=True, eq=False)
+class BackProjection:
+    """The points that the edge pixels point at.
+
+    Attributes
+    ----------
+    rows : (E,) int64
+        Rows of the points, ascending, each once.
+    strength : (E,) float64
+        Mean of the magnitude over the edge pixels whose window holds the point.
+    """
+
+    rows: np.ndarray
+    strength: np.ndarray
+
+
+def pixel_coordinates(xyz: np.ndarray, grid: PixelGrid) -> np.ndarray:
+    """Give each point its pixel (eq. 3-4), flat: ``row * width + col``, counted from 0.
+
+    Cells are half-open; the points at xmax and ymax, which the equations put into column W + 1 and row H + 1, belong to
+    the last ones.
+
+    Parameters
+    ----------
+    xyz : (N, 3) float64
+    grid : PixelGrid
+
+    Returns
+    -------
+    (N,) int64
+    """
+    pixels = np.empty(len(xyz), np.int64)
+    run_slices(_pixels, len(xyz), xyz, grid.lower, grid.upper, grid.width, grid.height, pixels, size=65536)
+    return pixels
+
+
+def grey_values(z: np.ndarray, lower: float, upper: float, gray_min: float) -> np.ndarray:
+    """Map heights to grey (eq. 5): `gray_min` at the lowest, 255 at the highest; 255 everywhere if they are equal."""
+    if upper == lower:
+        return np.full(z.shape, 255.0)
+    return gray_min + (255.0 - gray_min) * (z - lower) / (upper - lower)
+
+
+def project(xyz: np.ndarray, grid: PixelGrid) -> np.ndarray:
+    """Project points vertically (eq. 1-2) and keep in each pixel the height nearest the viewer, the highest z.
+
+    Returns
+    -------
+    (H, W) float64
+        NaN where no point falls.
+    """
+    highest = np.full(grid.height * grid.width, -np.inf)
+    _highest(pixel_coordinates(xyz, grid), xyz, highest)
+    highest[np.isneginf(highest)] = np.nan
+    return highest.reshape(grid.height, grid.width)
+
+
+def grey_image(depth: np.ndarray, grid: PixelGrid, gray_min: float) -> np.ndarray:
+    """Paint the grey value of each pixel's height (eq. 6), 0 where no point falls; (H, W) float64."""
+    return np.nan_to_num(grey_values(depth, float(grid.lower[2]), float(grid.upper[2]), gray_min))
+
+
+def occupied_spacing(xyz: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> float:
+    """Estimate the spacing of points in the projection: the root of the covered area per point, in the cloud's unit.
+
+    The covered area is counted in square cells of about 8 points each, in one pass.
+    """
+    extent = upper[:2] - lower[:2]
+    cell = float(np.sqrt(8 * extent[0] * extent[1] / len(xyz)))
+    width, height = (max(int(np.ceil(length / cell)), 1) for length in extent)
+    grid = PixelGrid(width, height, lower, upper)
+    occupied = np.count_nonzero(np.bincount(pixel_coordinates(xyz, grid), minlength=1))
+    return float(np.sqrt(occupied * np.prod(grid.pixel) / len(xyz)))
+
+
+def back_project(
+    xyz: np.ndarray, grid: PixelGrid, edges: np.ndarray, magnitude: np.ndarray, tolerance: float
+) -> BackProjection:
+    """Find the points of the edge pixels (eq. 18-19 and the paper's Code 1, corrected).
+
+    A point belongs to pixel (i, j) when ``|x - x_i| < tolerance`` and ``|y - y_j| < tolerance``, where ``x_i, y_j`` is
+    the pixel's corner of eq. 18-19. Code 1 goes through all points for every edge pixel and lists a point again for
+    every window that holds it; here the pixels are counted for every point, in O(points + pixels), each point once.
+
+    Parameters
+    ----------
+    xyz : (N, 3) float64
+    grid : PixelGrid
+    edges : (H, W) bool
+    magnitude : (H, W) float64
+    tolerance : float
+        Half the side of the window, in the cloud's unit.
+    """
+    counts = _summed(edges.astype(np.int64))
+    totals = _summed(np.where(edges, magnitude, 0.0))
+    strength = np.empty(len(xyz))
+    run_slices(_window_means, len(xyz), xyz, grid.lower, grid.upper, counts, totals, tolerance, strength, size=65536)
+    rows = np.flatnonzero(strength >= 0)
+    return BackProjection(rows, strength[rows])
+
+
+def _summed(values: np.ndarray) -> np.ndarray:
+    """Summed-area table with a leading row and column of zeros: any window's sum from four of its entries."""
+    return np.pad(values.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
+
+
+@kernel
+def _pixels(start, stop, xyz, lower, upper, width, height, pixels):
+    extent_x, extent_y = upper[0] - lower[0], upper[1] - lower[1]
+    for p in range(start, stop):
+        col = min(int(width * (xyz[p, 0] - lower[0]) / extent_x), width - 1)
+        row = min(int(height * (xyz[p, 1] - lower[1]) / extent_y), height - 1)
+        pixels[p] = row * width + col
+
+
+@kernel
+def _highest(pixels, xyz, highest):
+    for p in range(len(pixels)):
+        if xyz[p, 2] > highest[pixels[p]]:
+            highest[pixels[p]] = xyz[p, 2]
+
+
+@kernel
+def _window(value, lower, extent, count, tolerance):
+    """First and one past the last pixel along an axis whose corner is nearer than the tolerance."""
+    size = extent / count
+    first = max(int(math.floor((value - tolerance - lower) / size)), 0)
+    last = min(int(math.ceil((value + tolerance - lower) / size)), count - 1)
+    # The division only guesses; whether a corner counts is decided by the very comparison of Code 1.
+    while first <= last and not abs(value - (first * extent / count + lower)) < tolerance:
+        first += 1
+    while last >= first and not abs(value - (last * extent / count + lower)) < tolerance:
+        last -= 1
+    return first, last + 1
+
+
+@kernel
+def _window_means(start, stop, xyz, lower, upper, counts, totals, tolerance, means):
+    height, width = counts.shape[0] - 1, counts.shape[1] - 1
+    for p in range(start, stop):
+        left, right = _window(xyz[p, 0], lower[0], upper[0] - lower[0], width, tolerance)
+        low, high = _window(xyz[p, 1], lower[1], upper[1] - lower[1], height, tolerance)
+        count = counts[high, right] - counts[low, right] - counts[high, left] + counts[low, left]
+        if count > 0:
+            total = totals[high, right] - totals[low, right] - totals[high, left] + totals[low, left]
+            means[p] = max(total, 0.0) / count
+        else:
+            means[p] = -1.0
