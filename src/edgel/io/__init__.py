@@ -1,0 +1,174 @@
+"""Read and write point clouds: one module a format, chosen by the extension of the file.
+
+``READERS`` and ``WRITERS`` map extensions to functions; `read` and `write` look them up and check the content.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, BinaryIO, NoReturn
+
+from edgel.cloud import Cloud
+from edgel.io import depth, e57, npy, pcd, ply, text
+from edgel.io.depth import Intrinsics, read_intrinsics
+from edgel.io.errors import FormatError
+from edgel.io.files import check_readable, describe
+
+__all__ = ["READERS", "WRITERS", "FormatError", "Intrinsics", "read", "read_intrinsics", "write"]
+
+
+def _read_las(path: str | os.PathLike[str]) -> Cloud:
+    from edgel.io import las  # not at the top: laspy takes time to import, most files are not LAS
+
+    return las.read(path)
+
+
+def _write_las(path: str | os.PathLike[str], cloud: Cloud) -> None:
+    from edgel.io import las
+
+    las.write(path, cloud)
+
+
+_TEXT = (".xyz", ".txt", ".csv", ".asc", ".pts")
+_DEPTH = (".png", ".tif", ".tiff")
+
+READERS: dict[str, Callable[[Any], Cloud]] = {
+    ".ply": ply.read,
+    ".pcd": pcd.read,
+    ".las": _read_las,
+    ".laz": _read_las,
+    **dict.fromkeys(_TEXT, text.read),
+    ".npy": npy.read_npy,
+    ".npz": npy.read_npz,
+    ".e57": e57.read,
+    **dict.fromkeys(_DEPTH, depth.read),
+}
+"""Functions ``(path) -> Cloud`` by extension, lower case."""
+
+WRITERS: dict[str, Callable[[Any, Cloud], None]] = {
+    ".ply": ply.write,
+    ".pcd": pcd.write,
+    ".las": _write_las,
+    ".laz": _write_las,
+    **dict.fromkeys(_TEXT, text.write),
+    ".npy": npy.write_npy,
+    ".npz": npy.write_npz,
+    ".e57": e57.write,
+}
+"""Functions ``(path, cloud)`` by extension, lower case."""
+
+_MESH = "a mesh, not a point cloud; sample it first"
+_NOT_CLOUDS = {
+    **dict.fromkeys((".stl", ".obj", ".off", ".3mf", ".gltf", ".glb", ".dae"), _MESH),
+    **dict.fromkeys((".step", ".stp", ".iges", ".igs", ".brep"), "a CAD model, not a point cloud; sample it first"),
+    **dict.fromkeys((".mcap", ".bag", ".db3"), "a ROS recording, not supported; convert its clouds to .pcd first"),
+    **dict.fromkeys((".jpg", ".jpeg", ".bmp", ".exr"), "an image; depth is read from .png, .tif or .npy"),
+    **dict.fromkeys((".gz", ".zip", ".7z", ".xz", ".bz2"), "compressed; unpack it first"),
+}
+
+
+def read(
+    path: str | os.PathLike[str] | BinaryIO, *, intrinsics: Intrinsics | str | os.PathLike[str] | None = None
+) -> Cloud:
+    """Read a point cloud; the extension tells the format, the content is checked.
+
+    Parameters
+    ----------
+    path : path or binary file
+        PLY, PCD, LAS, LAZ (COPC too), XYZ, TXT, CSV, ASC, PTS, NPY, NPZ, E57, or a depth image (PNG, TIFF, NPY). An open
+        binary file (``sys.stdin.buffer``) is read as PLY.
+    intrinsics : Intrinsics or path, optional
+        The camera of a depth image, or the JSON file that holds it; see `edgel.io.depth.read`.
+
+    Returns
+    -------
+    Cloud
+        Float64 coordinates in the file's unit, everything else it says about the points as attributes.
+
+    Raises
+    ------
+    FileNotFoundError, IsADirectoryError, PermissionError
+        If there is no such file that can be read.
+    FormatError
+        If the extension is unknown, the content is something else, or the file is cut off or damaged.
+    ValueError
+        If `intrinsics` are given for a file that is no depth image.
+
+    Examples
+    --------
+    >>> import tempfile, numpy as np
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write(f"{folder}/a.ply", Cloud(np.eye(3), {"label": np.array([1, 2, 3], np.uint8)}))
+    ...     read(f"{folder}/a.ply")
+    Cloud(3 points, unorganized; attributes: label)
+    """
+    if not isinstance(path, (str, os.PathLike)):
+        _check_stream(path, "read")
+        return ply.read(path)
+    extension = Path(path).suffix.lower()
+    check_readable(path)
+    if extension not in READERS:
+        _unknown(path, extension, READERS)
+    if intrinsics is None:
+        return READERS[extension](path)
+    if extension not in (*_DEPTH, ".npy"):
+        raise ValueError(f"intrinsics: {os.fspath(path)} is no depth image ({', '.join(_DEPTH)}, .npy); leave them out")
+    return depth.read(path, intrinsics=intrinsics)
+
+
+def write(path: str | os.PathLike[str] | BinaryIO, cloud: Cloud) -> None:
+    """Write a point cloud; the extension tells the format. The file appears whole or not at all.
+
+    Parameters
+    ----------
+    path : path or binary file
+        PLY, PCD, LAS, LAZ, XYZ, TXT, CSV, ASC, PTS, NPY, NPZ or E57. An open binary file (``sys.stdout.buffer``) gets PLY.
+    cloud : Cloud
+        What each format keeps is said in its module; values are never rounded silently, save to the grid of LAS.
+
+    Raises
+    ------
+    FormatError
+        If the extension is unknown, or the format cannot hold the cloud; the message tells the remedy.
+    OSError
+        If the file cannot be written; nothing is left behind.
+
+    Examples
+    --------
+    >>> import tempfile, numpy as np
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write(f"{folder}/a.pcd", Cloud(np.eye(3)))
+    ...     len(read(f"{folder}/a.pcd"))
+    3
+    """
+    if not isinstance(cloud, Cloud):
+        raise TypeError(f"cloud: expected a Cloud, got {type(cloud).__name__}; make one with edgel.Cloud(points)")
+    if not isinstance(path, (str, os.PathLike)):
+        _check_stream(path, "write")
+        ply.write(path, cloud)
+        return
+    extension = Path(path).suffix.lower()
+    if extension not in WRITERS:
+        _unknown(path, extension, WRITERS)
+    WRITERS[extension](path, cloud)
+
+
+def _check_stream(file: Any, method: str) -> None:
+    if not hasattr(file, method):
+        raise TypeError(f"path: expected a path or a binary file, got {type(file).__name__}")
+    if hasattr(file, "encoding"):
+        raise TypeError("path: a text file; pass the binary one (sys.stdin.buffer, sys.stdout.buffer, open(..., 'rb'))")
+
+
+def _unknown(path: str | os.PathLike[str], extension: str, known: dict[str, Any]) -> NoReturn:
+    name, formats = os.fspath(path), " ".join(known)
+    if extension in _NOT_CLOUDS:
+        raise FormatError(f"{name}: {_NOT_CLOUDS[extension]} (known: {formats})")
+    seems = ""
+    if known is READERS:
+        with open(path, "rb") as file:
+            what, remedy = describe(file.read(512))
+        seems = f"; the file seems to be {what}: {remedy}"
+    raise FormatError(f"{name}: the extension {extension!r} is unknown (known: {formats}){seems}")

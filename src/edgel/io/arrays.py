@@ -1,0 +1,43 @@
+"""One .npy array, read with its promises checked first."""
+
+from __future__ import annotations
+
+import warnings
+from typing import IO
+
+import numpy as np
+from numpy.lib import format as npy_format
+
+from edgel.io.errors import FormatError
+from edgel.io.files import wrong_magic
+
+
+def read_array(path: str, file: IO[bytes], size: int) -> np.ndarray:
+    """Read one .npy array of a file or archive member of `size` bytes; FormatError if it is not whole."""
+    head = file.read(8)
+    if not head.startswith(b"\x93NUMPY"):
+        wrong_magic(path, "a NumPy array", head + file.read(512))
+    try:
+        readers = {1: npy_format.read_array_header_1_0, 2: npy_format.read_array_header_2_0}
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # headers that Python 2 wrote
+            shape, fortran, dtype = readers[min(head[6], 2)](file)
+    except Exception as error:  # the header is a Python literal: many errors are possible, all mean a damaged file
+        raise FormatError(f"{path}: the .npy header is damaged ({error}); get the file again") from None
+    if dtype.hasobject:
+        raise FormatError(f"{path}: holds Python objects, which may run code when loaded; save plain numbers")
+    if any(length < 0 for length in shape):
+        raise FormatError(f"{path}: the .npy header promises an array of shape {shape}; get the file again")
+    count = 1
+    for length in shape:  # Python's integers do not overflow
+        count *= length
+    if count * dtype.itemsize > size:
+        raise FormatError(
+            f"{path}: declared an array of shape {shape}, the file has {size} bytes; it is cut off: get it again"
+        )
+    raw = file.read(count * dtype.itemsize)
+    if len(raw) < count * dtype.itemsize:
+        found = len(raw) // dtype.itemsize
+        raise FormatError(f"{path}: declared {count} values, found {found}; the file is cut off: get it again")
+    array = np.frombuffer(bytearray(raw), dtype, count) if dtype.itemsize else np.empty(count, dtype)
+    return array.reshape(shape, order="F" if fortran else "C")

@@ -1,0 +1,84 @@
+"""Between attributes of a cloud and the named columns of a file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from edgel.cloud import Cloud
+from edgel.io.errors import FormatError
+
+_SHORT_COLORS = {"r": "red", "g": "green", "b": "blue"}
+
+
+def flat_attributes(cloud: Cloud, path: object, *, keep_arrays: bool = False) -> dict[str, np.ndarray]:
+    """Return the attributes as columns that a file of named columns can hold.
+
+    Parameters
+    ----------
+    cloud : Cloud
+    path : object
+        Named in errors.
+    keep_arrays : bool
+        Leave (N, C) attributes whole, for formats whose columns may have several values.
+
+    Returns
+    -------
+    dict of str to (N,) array
+        (N, C) attributes become ``name_0 .. name_{C-1}``, white space in names becomes ``_``.
+
+    Raises
+    ------
+    FormatError
+        If an attribute is not numeric, or two columns would get one name.
+    """
+    columns: dict[str, np.ndarray] = {}
+    for name, values in cloud.attributes.items():
+        if values.dtype.kind not in "biuf":
+            raise FormatError(
+                f"{path}: attribute {name!r} holds {values.dtype}, not numbers; leave it out or convert it"
+            )
+        word = re.sub(r"\s+", "_", name.strip()) or "_"
+        parts = {word: values}
+        if values.ndim > 1:
+            table = values.reshape(len(values), -1)
+            parts = {word: table} if keep_arrays else {f"{word}_{i}": table[:, i] for i in range(table.shape[1])}
+        for part, column in parts.items():
+            if part in columns or part.lower() in ("x", "y", "z"):
+                raise FormatError(f"{path}: two columns would be called {part!r}; rename attribute {name!r}")
+            columns[part] = column
+    return columns
+
+
+def find_xyz(names: Iterable[str]) -> list[str] | None:
+    """Return the names of the x, y and z columns (upper or lower case), None when one is missing."""
+    lower: dict[str, str] = {}
+    for name in names:
+        lower.setdefault(name.lower(), name)
+    return [lower[axis] for axis in "xyz"] if all(axis in lower for axis in "xyz") else None
+
+
+def spell_out_colors(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Call columns r, g, b (all three there, any case) red, green and blue, as every other format does."""
+    lower = {name.lower() for name in columns}
+    if not {"r", "g", "b"} <= lower or lower & set(_SHORT_COLORS.values()):
+        return dict(columns)
+    return {_SHORT_COLORS.get(name.lower(), name): values for name, values in columns.items()}
+
+
+def fits_float32(xyz: np.ndarray) -> bool:
+    """Whether every coordinate keeps its exact value as float32."""
+    with np.errstate(over="ignore"):
+        # In slices: the first that does not fit ends it, and nothing of the cloud's size is allocated.
+        for start in range(0, len(xyz), 65536):
+            part = xyz[start : start + 65536]
+            if not np.array_equal(part, part.astype(np.float32), equal_nan=True):
+                return False
+    return True
+
+
+def one_line(text: object) -> str:
+    """Return a text with every run of white space as one blank, to go into a line of a header."""
+    return " ".join(str(text).split())

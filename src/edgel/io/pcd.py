@@ -1,0 +1,324 @@
+"""PCD of the Point Cloud Library: ascii, binary and binary_compressed, organized or not."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from typing import BinaryIO
+
+import numpy as np
+
+from edgel.cloud import Cloud
+from edgel.io.columns import find_xyz, fits_float32, flat_attributes
+from edgel.io.errors import FormatError
+from edgel.io.files import reading, replacing, wrong_magic
+from edgel.io.lzf import lzf_decompress
+from edgel.io.rows import number_of, parse_text, read_binary, reject_row, remaining_bytes, write_binary
+
+_TYPES = {"F": ("4", "8"), "I": ("1", "2", "4", "8"), "U": ("1", "2", "4", "8")}
+_IDENTITY = (1.0, 0.0, 0.0, 0.0)
+_COLORS = ("red", "green", "blue")
+# LZF packs at most 264 bytes into three.
+_MAX_LZF_RATIO = 88
+
+
+@dataclass(frozen=True)
+class _Header:
+    dtype: np.dtype
+    padding: list[str]
+    axes: list[str]
+    width: int
+    height: int
+    count: int
+    viewpoint: tuple[float, ...] | None
+    data: str
+    num_lines: int
+
+
+def read(path: str | os.PathLike[str]) -> Cloud:
+    """Read a PCD file.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    Cloud
+        Fields as attributes of their own type, (N, C) where COUNT is C; padding fields (``_``) left out. Packed ``rgb`` or
+        ``rgba`` becomes ``red``, ``green``, ``blue`` (uint8), and ``alpha`` from ``rgba`` when it is not 0 or 255
+        throughout. HEIGHT above 1 makes the cloud organized. The translation of VIEWPOINT is the viewpoint; all seven numbers are in
+        ``metadata["pcd_viewpoint"]``. Coordinates of an ascii file are parsed as double even where SIZE is 4.
+
+    Raises
+    ------
+    FormatError
+        If the file is not PCD, its header contradicts itself, or its data is cut off or damaged.
+
+    Examples
+    --------
+    >>> import tempfile, numpy as np
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write(f"{folder}/a.pcd", Cloud(np.zeros((2, 3, 3)), viewpoint=np.array([0, 0, 1])))
+    ...     read(f"{folder}/a.pcd")
+    Cloud(6 points, organized 2 x 3; attributes: none)
+    """
+    name = os.fspath(path)
+    with reading(path) as file:
+        header = _read_header(name, file)
+        body = {"ascii": _read_ascii, "binary": _read_plain, "binary_compressed": _read_compressed}[header.data]
+        xyz, fields = body(name, file, header)
+    attributes: dict[str, np.ndarray] = {}
+    for field, values in fields.items():
+        if field.lower() in ("rgb", "rgba") and values.ndim == 1 and values.dtype.itemsize == 4:
+            attributes.update(_unpack_colors(values, with_alpha=field.lower() == "rgba"))
+        else:
+            attributes[field] = values
+    shape = (header.height, header.width) if header.height > 1 and header.count else None
+    viewpoint = np.array(header.viewpoint[:3]) if header.viewpoint else None
+    metadata = {"pcd_viewpoint": header.viewpoint} if header.viewpoint else {}
+    return Cloud(xyz, attributes, shape, viewpoint, None, metadata)
+
+
+def _read_header(path: str, file: BinaryIO) -> _Header:
+    entries: dict[str, list[str]] = {}
+    num_lines, head = 0, b""
+    while "DATA" not in entries:
+        line = file.readline(1 << 16)
+        head += line
+        num_lines += 1
+        words = line.decode("utf-8", "replace").split("#")[0].split()
+        if words and words[0].upper() in ("VERSION", "FIELDS", "COLUMNS", "SIZE", "TYPE", "COUNT", "WIDTH", "HEIGHT",
+                                          "VIEWPOINT", "POINTS", "DATA"):  # fmt: skip
+            entries[words[0].upper()] = words[1:]
+        elif words or not line or len(head) > 1 << 20:
+            break
+    if not re.match(rb"\s*(#\s*\.PCD|#|VERSION\s|FIELDS\s|COLUMNS\s)", head, re.IGNORECASE) or not entries:
+        wrong_magic(path, "a PCD file (it has no PCD header)", head + file.read(512))
+    if "DATA" not in entries:
+        raise FormatError(f"{path}: the PCD header breaks off at line {num_lines}, before DATA; get the file again")
+    return _parse_header(path, entries, num_lines)
+
+
+def _parse_header(path: str, entries: dict[str, list[str]], num_lines: int) -> _Header:
+    fields = entries.get("FIELDS") or entries.get("COLUMNS") or []  # COLUMNS: PCD before 0.6
+    sizes, types = entries.get("SIZE", []), entries.get("TYPE", [])
+    counts = entries.get("COUNT", ["1"] * len(fields))
+    if not fields or not len(fields) == len(sizes) == len(types) == len(counts):
+        found = f"{len(fields)} FIELDS, {len(sizes)} SIZE, {len(types)} TYPE, {len(counts)} COUNT"
+        raise FormatError(f"{path}: the PCD header does not fit together ({found}); mend or re-export the file")
+    axes = find_xyz(fields)
+    if axes is None:
+        raise FormatError(f"{path}: the PCD fields are {' '.join(fields)}; x, y and z are needed")
+    layout, padding = [], []
+    for i, (field, size, kind, count) in enumerate(zip(fields, sizes, types, counts, strict=True)):
+        if size not in _TYPES.get(kind.upper(), ()) or not count.isdecimal() or not 0 < int(count) < 1 << 20:
+            raise FormatError(
+                f"{path}: PCD field {field!r} has TYPE {kind} SIZE {size} COUNT {count}; mend or re-export the file"
+            )
+        if field == "_":
+            padding.append(f"_{i}")
+        shape = () if count == "1" else (int(count),)
+        layout.append((f"_{i}" if field == "_" else field, "<" + kind.lower() + size, shape))
+    names = [name for name, _, _ in layout]
+    if len(set(names)) < len(names) or any(shape for name, _, shape in layout if name in axes):
+        raise FormatError(
+            f"{path}: PCD fields {' '.join(fields)}: a name twice, or a coordinate of several values; rename it"
+        )
+    width, height, points = _extent(path, entries)
+    data = entries["DATA"][0].lower() if entries["DATA"] else ""
+    if data not in ("ascii", "binary", "binary_compressed"):
+        raise FormatError(
+            f"{path}: PCD DATA is {data!r}; ascii, binary or binary_compressed is known: re-export the file"
+        )
+    view = entries.get("VIEWPOINT")
+    if view is not None and (len(view) != 7 or not all(number_of(w) and np.isfinite(float(w)) for w in view)):
+        raise FormatError(f"{path}: PCD VIEWPOINT is {' '.join(view)!r}; seven finite numbers are needed")
+    viewpoint = tuple(map(float, view)) if view else None
+    return _Header(np.dtype(layout), padding, axes, width, height, points, viewpoint, data, num_lines)
+
+
+def _extent(path: str, entries: dict[str, list[str]]) -> tuple[int, int, int]:
+    numbers = {}
+    for key in ("WIDTH", "HEIGHT", "POINTS"):
+        words = entries.get(key)
+        if words is not None and (len(words) != 1 or not words[0].isdecimal()):
+            raise FormatError(f"{path}: PCD {key} is {' '.join(words)!r}; one whole number is needed")
+        if words:
+            numbers[key] = int(words[0])
+    if "WIDTH" not in numbers and "POINTS" not in numbers:
+        raise FormatError(f"{path}: the PCD header has neither WIDTH nor POINTS; mend or re-export the file")
+    height = numbers.get("HEIGHT", 1)
+    width = numbers["WIDTH"] if "WIDTH" in numbers else numbers["POINTS"] // max(height, 1)
+    points = numbers.get("POINTS", width * height)
+    if width * height != points:
+        raise FormatError(f"{path}: PCD WIDTH {width} x HEIGHT {height} is not POINTS {points}; mend the header")
+    return width, height, points
+
+
+def _cut_off(path: str, declared: int, found: int) -> FormatError:
+    what = "the file is cut off: get it again" if found < declared else "mend POINTS, WIDTH and HEIGHT"
+    return FormatError(f"{path}: declared {declared} points, found {found}; {what}")
+
+
+def _read_ascii(path: str, file: BinaryIO, header: _Header) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    # Commas and semicolons separate too: PDAL and spreadsheets write them.
+    text = re.sub(rb"[,;]", b" ", file.read()).decode("utf-8", "replace")
+    rows = [line for line in text.splitlines() if not line.isspace() and line]
+    if len(rows) != header.count:
+        raise _cut_off(path, header.count, len(rows))
+    # Double whatever SIZE says: UTM coordinates are written with more digits than a float of 4 bytes keeps.
+    layout = []
+    for name in header.dtype.names or ():
+        base, shape = header.dtype[name].base, header.dtype[name].shape
+        layout.append((name, np.dtype("f8") if name in header.axes else base.newbyteorder("="), shape))
+    dtype = np.dtype(layout)
+    try:
+        table = parse_text(rows, dtype) if rows else np.empty(0, dtype)
+    except ValueError as error:
+        width = sum(int(np.prod(dtype[name].shape, dtype=int)) for name in dtype.names or ())
+        raise reject_row(path, " ".join(dtype.names or ()), rows, width, error, header.num_lines + 1) from None
+    xyz = np.column_stack([table[name] for name in header.axes])
+    names = [name for name in dtype.names or () if name not in header.axes and name not in header.padding]
+    return xyz, {name: np.ascontiguousarray(table[name]) for name in names}
+
+
+def _read_plain(path: str, file: BinaryIO, header: _Header) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    found = remaining_bytes(file) // header.dtype.itemsize
+    if found < header.count:
+        raise _cut_off(path, header.count, found)
+    # Colours packed into a float are NaN for some alphas, which a float copy need not keep: take them as integers.
+    layout = []
+    for name in header.dtype.names or ():
+        packed = name.lower() in ("rgb", "rgba") and header.dtype[name] == np.dtype("<f4")
+        layout.append((name, "<u4" if packed else header.dtype[name]))
+    return read_binary(file, np.dtype(layout), header.count, header.axes, leave_out=header.padding)
+
+
+def _read_compressed(path: str, file: BinaryIO, header: _Header) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    sizes = np.frombuffer(file.read(8), "<u4") if remaining_bytes(file) >= 8 else np.zeros(2, "<u4")
+    packed_size, size = map(int, sizes)
+    names = list(header.dtype.names or ())
+    # PCL leaves padding fields out of compressed data, others keep them; the size tells which.
+    if size == header.count * (header.dtype.itemsize - sum(header.dtype[name].itemsize for name in header.padding)):
+        names = [name for name in names if name not in header.padding]
+    elif size != header.count * header.dtype.itemsize:
+        raise FormatError(
+            f"{path}: declared {header.count} points, the packed data holds {size} bytes; re-export the file"
+        )
+    if packed_size > remaining_bytes(file) or size > packed_size * _MAX_LZF_RATIO:
+        found = remaining_bytes(file)
+        raise FormatError(
+            f"{path}: declared {packed_size} packed bytes, found {found}; the file is cut off: get it again"
+        )
+    out = np.empty(size, np.uint8)
+    if lzf_decompress(np.frombuffer(file.read(packed_size), np.uint8), out) != size:
+        raise FormatError(f"{path}: the packed PCD data is damaged; get the file again")
+    columns: dict[str, np.ndarray] = {}
+    position = 0
+    for name in names:
+        field = header.dtype[name]
+        part = out[position : position + header.count * field.itemsize]
+        columns[name] = part.view(field.base).reshape(header.count, *field.shape)
+        position += part.size
+    xyz = np.column_stack([columns.pop(name).astype(np.float64) for name in header.axes])
+    kept = {name: values for name, values in columns.items() if name not in header.padding}
+    # Views keep the whole unpacked buffer alive; copies also are aligned and of native byte order.
+    return xyz, {name: values.astype(values.dtype.newbyteorder("="), copy=True) for name, values in kept.items()}
+
+
+def _unpack_colors(packed: np.ndarray, *, with_alpha: bool) -> dict[str, np.ndarray]:
+    bits = np.ascontiguousarray(packed).view(np.uint32)
+    shifts = {"red": 16, "green": 8, "blue": 0, "alpha": 24}
+    channels = {name: (bits >> shift & 255).astype(np.uint8) for name, shift in shifts.items()}
+    alpha = channels["alpha"]
+    if not with_alpha or not len(alpha) or ((alpha == alpha[0]).all() and alpha[0] in (0, 255)):
+        del channels["alpha"]
+    return channels
+
+
+def write(path: str | os.PathLike[str], cloud: Cloud) -> None:
+    """Write a binary PCD file.
+
+    Coordinates become F 4 when that is exact for all of them, else F 8 (which PCL's own point types do not read).
+    ``red``, ``green``, ``blue`` of uint8 are packed into ``rgb`` (F 4), with ``alpha`` into ``rgba`` (U 4), as PCL reads
+    them. Other attributes keep their type; bool becomes U 1 and float16 F 4; (N, C) attributes get COUNT C. The
+    rotation of ``metadata["pcd_viewpoint"]`` is kept; without a viewpoint the line VIEWPOINT is left out.
+
+    Parameters
+    ----------
+    path : path
+    cloud : Cloud
+
+    Raises
+    ------
+    FormatError
+        If PCD cannot hold an attribute.
+    OSError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile, numpy as np
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write(f"{folder}/a.pcd", Cloud(np.eye(3)))
+    ...     len(read(f"{folder}/a.pcd"))
+    3
+    """
+    columns: dict[str, np.ndarray] = dict(zip("xyz", cloud.xyz.T, strict=True))
+    columns.update(_pack_colors(flat_attributes(cloud, path, keep_arrays=True)))
+    coordinate = "<f4" if fits_float32(cloud.xyz) else "<f8"
+    layout: list[tuple[str, str, tuple[int, ...]]] = []
+    for name, values in columns.items():
+        code = coordinate if name in ("x", "y", "z") else _code(path, name, values)
+        layout.append((name, code, values.shape[1:] if values.shape[1:] != (1,) else ()))
+    columns = {name: values[:, 0] if values.shape[1:] == (1,) else values for name, values in columns.items()}
+    with replacing(path) as file:
+        file.write(_header(cloud, layout).encode())
+        write_binary(file, np.dtype(layout), columns)
+
+
+def _pack_colors(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    if not all(name in columns and columns[name].dtype == np.uint8 and columns[name].ndim == 1 for name in _COLORS):
+        return columns
+    if "rgb" in columns or "rgba" in columns:
+        return columns
+    red, green, blue = (columns.pop(name).astype(np.uint32) for name in _COLORS)
+    bits = red << 16 | green << 8 | blue
+    if "alpha" in columns and columns["alpha"].dtype == np.uint8:
+        return {**columns, "rgba": bits | columns.pop("alpha").astype(np.uint32) << 24}
+    return {**columns, "rgb": bits.view(np.float32)}
+
+
+def _code(path: object, name: str, values: np.ndarray) -> str:
+    kind, size = values.dtype.kind, values.dtype.itemsize
+    if kind == "b":
+        return "<u1"
+    if (kind, size) == ("f", 2):
+        return "<f4"
+    if size > 8:
+        raise FormatError(f"{path}: attribute {name!r} is {values.dtype}, wider than PCD knows; convert it to float64")
+    return f"<{kind}{size}"
+
+
+def _header(cloud: Cloud, layout: list[tuple[str, str, tuple[int, ...]]]) -> str:
+    height, width = cloud.shape or (1, len(cloud))
+    lines = [
+        "# .PCD v0.7 - Point Cloud Data file format",
+        "VERSION 0.7",
+        "FIELDS " + " ".join(name for name, _, _ in layout),
+        "SIZE " + " ".join(code[2:] for _, code, _ in layout),
+        "TYPE " + " ".join(code[1].upper() for _, code, _ in layout),
+        "COUNT " + " ".join(str(shape[0] if shape else 1) for _, _, shape in layout),
+        f"WIDTH {width}",
+        f"HEIGHT {height}",
+    ]
+    if cloud.viewpoint is not None:
+        rotation = tuple(cloud.metadata.get("pcd_viewpoint", ()))[3:] or _IDENTITY
+        lines.append("VIEWPOINT " + " ".join(map(_number, (*cloud.viewpoint.tolist(), *rotation))))
+    return "\n".join([*lines, f"POINTS {len(cloud)}", "DATA binary", ""])
+
+
+def _number(value: float) -> str:
+    return repr(int(value)) if value == int(value) else repr(float(value))

@@ -1,0 +1,357 @@
+"""PLY, ascii and binary of either byte order: every scalar of the vertices, nothing of the faces."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from io import BytesIO, TextIOWrapper
+from itertools import islice
+from typing import BinaryIO
+
+import numpy as np
+
+from edgel.cloud import Cloud
+from edgel.io.columns import find_xyz, fits_float32, flat_attributes, one_line
+from edgel.io.errors import FormatError
+from edgel.io.files import reading, replacing, wrong_magic
+from edgel.io.ply_lists import gather, walk_rows
+from edgel.io.rows import number_of, parse_text, read_binary, reject_row, remaining_bytes, write_binary
+
+_TYPES = {
+    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4", "double": "f8",
+    "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4", "float32": "f4",
+    "float64": "f8", "int64": "i8", "uint64": "u8",
+}  # fmt: skip
+_NAMES = {code: name for name, code in list(_TYPES.items())[:8]}
+_BYTE_ORDER = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
+
+
+@dataclass(frozen=True)
+class _Property:
+    name: str
+    code: str  # NumPy type of the value, or of a list's values
+    length_code: str | None  # NumPy type of a list's length, None for a scalar
+
+
+@dataclass(frozen=True)
+class _Element:
+    name: str
+    count: int
+    properties: list[_Property]
+
+    @property
+    def min_row(self) -> int:
+        """Bytes that a binary row takes at least (its lists empty)."""
+        return sum(np.dtype(p.length_code or p.code).itemsize for p in self.properties)
+
+
+@dataclass(frozen=True)
+class _Header:
+    order: str
+    ascii: bool
+    elements: list[_Element]
+    comments: list[str]
+    info: dict[str, str]
+    num_lines: int
+
+
+def read(path: str | os.PathLike[str] | BinaryIO) -> Cloud:
+    """Read a PLY file.
+
+    Parameters
+    ----------
+    path : path or binary file
+        A stream (``sys.stdin.buffer``) is read to its end.
+
+    Returns
+    -------
+    Cloud
+        All scalar vertex properties as (N,) attributes of their own type; list properties, faces and other elements are
+        left out. ``obj_info num_cols`` and ``num_rows`` make the cloud organized.
+
+    Raises
+    ------
+    FormatError
+        If the file is not PLY, is cut off, or its vertices have no x, y and z.
+
+    Examples
+    --------
+    >>> from io import BytesIO
+    >>> text = b"ply\\nformat ascii 1.0\\nelement vertex 1\\nproperty float x\\nproperty float y\\nproperty float z\\nend_header\\n1 2 3\\n"
+    >>> read(BytesIO(text)).xyz
+    array([[1., 2., 3.]])
+    """
+    if isinstance(path, (str, os.PathLike)):
+        with reading(path) as file:
+            return _read(os.fspath(path), file)
+    return _read(str(getattr(path, "name", "stream")), BytesIO(path.read()))
+
+
+def _read(path: str, file: BinaryIO) -> Cloud:
+    header = _read_header(path, file)
+    position = [element.name for element in header.elements].index("vertex")
+    vertex = header.elements[position]
+    names = [p.name for p in vertex.properties if p.length_code is None]
+    axes = find_xyz(names)
+    if axes is None:
+        raise FormatError(f"{path}: the vertices have {', '.join(names) or 'no scalar'}; x, y and z are needed")
+    if len(set(names)) < len(names):
+        raise FormatError(f"{path}: two vertex properties have one name; rename one in the header")
+    _check_size(path, header, vertex, file)
+    read_body = _read_ascii if header.ascii else _read_binary
+    xyz, attributes = read_body(path, file, header, header.elements[:position], vertex, axes)
+    return _to_cloud(path, header, xyz, attributes)
+
+
+def _read_header(path: str, file: BinaryIO) -> _Header:
+    head = file.read(1 << 16)
+    if not re.match(rb"ply[ \t]*[\r\n]", head):
+        wrong_magic(path, "a PLY file", head[:512])
+    while not (end := re.search(rb"[\r\n]end_header[ \t]*(\r\n|\r|\n|$)", head)):
+        more = file.read(1 << 16)
+        if not more or len(head) > 1 << 24:
+            raise FormatError(f"{path}: the PLY header has no end_header; the file is cut off or damaged: get it again")
+        head += more
+    # With lines that end in a bare CR, an LF after end_header is data already.
+    bare_return = not head[: end.start()].count(b"\n")
+    file.seek(end.end(1) - (bare_return and end.group(1) == b"\r\n"))
+    lines = re.split(r"\r\n|\r|\n", head[: end.start()].decode("utf-8", "replace"))
+    return _parse_header(path, lines)
+
+
+def _parse_header(path: str, lines: list[str]) -> _Header:
+    order = ""
+    elements: list[_Element] = []
+    comments, info = [], {}
+    for number, line in enumerate(lines[1:], 2):
+        words = line.split()
+        match words:
+            case []:
+                pass
+            case ["comment", *_]:
+                comments.append(line.strip()[8:])
+            case ["obj_info", *rest]:
+                info[rest[0] if rest else ""] = line.strip().split(None, 2)[2] if len(rest) > 1 else ""
+            case ["format", kind, _] if kind in _BYTE_ORDER:
+                order = kind
+            case ["element", name, count] if count.isascii() and count.isdigit():
+                elements.append(_Element(name, int(count), []))
+            case ["property", "list", length, kind, name] if elements and kind in _TYPES and length in _TYPES:
+                elements[-1].properties.append(_Property(name, _TYPES[kind], _TYPES[length]))
+            case ["property", kind, name] if elements and kind in _TYPES:
+                elements[-1].properties.append(_Property(name, _TYPES[kind], None))
+            case _:
+                raise FormatError(f"{path}: header line {number} is no PLY: {line[:60]!r}; mend or re-export the file")
+    if not order:
+        raise FormatError(f"{path}: the PLY header names no format; mend or re-export the file")
+    if "vertex" not in [element.name for element in elements]:
+        found = ", ".join(element.name for element in elements) or "nothing"
+        raise FormatError(
+            f"{path}: the PLY file has no vertices (its elements: {found}); export the points as vertices"
+        )
+    return _Header(_BYTE_ORDER[order], order == "ascii", elements, comments, info, len(lines) + 1)
+
+
+def _check_size(path: str, header: _Header, vertex: _Element, file: BinaryIO) -> None:
+    """Compare what the header promises with the file's size, before anything is allocated."""
+    size = remaining_bytes(file)
+    row = 2 * len(vertex.properties) if header.ascii else vertex.min_row
+    if vertex.count * row - header.ascii > size:  # the last line of a text may lack its end
+        found = sum(bool(line.strip()) for line in file) if header.ascii else size // row
+        raise _cut_off(path, vertex.count, min(found, vertex.count))
+
+
+def _cut_off(path: str, declared: int, found: int) -> FormatError:
+    return FormatError(f"{path}: declared {declared} vertices, found {found}; the file is cut off: get it again")
+
+
+def _read_ascii(
+    path: str, file: BinaryIO, header: _Header, skipped: list[_Element], vertex: _Element, axes: list[str]
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    # CR alone ends lines too: universal newlines, as the header.
+    text = TextIOWrapper(file, "utf-8", "replace", newline=None)
+    num_skipped = sum(element.count for element in skipped)
+    lines = islice((line for line in text if not line.isspace()), num_skipped, num_skipped + vertex.count)
+    rows = list(lines)
+    text.detach()
+    if len(rows) < vertex.count:
+        raise _cut_off(path, vertex.count, len(rows))
+    if any(p.length_code for p in vertex.properties):
+        rows = [_without_lists(path, row, vertex) for row in rows]
+    scalars = [p for p in vertex.properties if p.length_code is None]
+    # Coordinates are parsed as double whatever the header says: a text may carry more digits than its float.
+    dtype = np.dtype([(p.name, "f8" if p.name in axes else p.code) for p in scalars])
+    try:
+        table = parse_text(rows, dtype) if rows else np.empty(0, dtype)
+    except ValueError as error:
+        what = " ".join(p.name for p in scalars)
+        raise reject_row(path, what, rows, len(scalars), error, header.num_lines + num_skipped) from None
+    xyz = np.column_stack([table[name] for name in axes])
+    return xyz, {p.name: np.ascontiguousarray(table[p.name]) for p in scalars if p.name not in axes}
+
+
+def _without_lists(path: str, row: str, vertex: _Element) -> str:
+    words = row.split()
+    kept, position = [], 0
+    for p in vertex.properties:
+        length = 0
+        if p.length_code is not None:
+            if position >= len(words) or not words[position].isdigit():
+                raise FormatError(
+                    f"{path}: vertex line {row.strip()[:60]!r} breaks off in list {p.name!r}; mend the file"
+                )
+            length = int(words[position])
+        else:
+            kept.append(words[position] if position < len(words) else "")
+        position += 1 + length
+    return " ".join([*kept, *words[position:]])
+
+
+def _read_binary(
+    path: str, file: BinaryIO, header: _Header, skipped: list[_Element], vertex: _Element, axes: list[str]
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    for element in skipped:
+        _skip(path, file, header, element)
+    if any(p.length_code for p in vertex.properties):
+        columns = _read_with_lists(path, file, header, vertex)
+        return np.column_stack([columns.pop(name).astype(np.float64) for name in axes]), columns
+    if vertex.count * vertex.min_row > remaining_bytes(file):
+        raise _cut_off(path, vertex.count, remaining_bytes(file) // vertex.min_row)
+    dtype = np.dtype([(p.name, header.order + p.code) for p in vertex.properties])
+    return read_binary(file, dtype, vertex.count, axes)
+
+
+def _skip(path: str, file: BinaryIO, header: _Header, element: _Element) -> None:
+    if not any(p.length_code for p in element.properties):
+        if element.count * element.min_row > remaining_bytes(file):
+            raise FormatError(
+                f"{path}: the data ends within element {element.name!r}; the file is cut off: get it again"
+            )
+        file.seek(element.count * element.min_row, 1)
+        return
+    _walk(path, file, header, element, keep=False)
+
+
+def _walk(
+    path: str, file: BinaryIO, header: _Header, element: _Element, *, keep: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pass over an element with lists; return the bytes it lies in and where each value begins."""
+    if element.count * element.min_row > remaining_bytes(file):
+        raise _cut_off(path, element.count, remaining_bytes(file) // element.min_row)
+    start = file.tell()
+    data = np.frombuffer(file.read(), np.uint8)
+    sizes = np.array([np.dtype(p.code).itemsize for p in element.properties], np.int64)
+    lengths = np.array([np.dtype(p.length_code).itemsize if p.length_code else 0 for p in element.properties], np.int64)
+    offsets = np.empty((element.count if keep else 0, len(sizes)), np.int64)
+    end = walk_rows(data, 0, element.count, sizes, lengths, header.order == ">", offsets)
+    if end < 0:
+        raise FormatError(
+            f"{path}: declared {element.count} of element {element.name!r}, the data ends in number {-1 - end}; "
+            "the file is cut off or a list length is wrong: get it again"
+        )
+    file.seek(start + end)
+    return data, offsets
+
+
+def _read_with_lists(path: str, file: BinaryIO, header: _Header, vertex: _Element) -> dict[str, np.ndarray]:
+    data, offsets = _walk(path, file, header, vertex, keep=True)
+    return {
+        p.name: gather(data, offsets[:, i], np.dtype(header.order + p.code))
+        for i, p in enumerate(vertex.properties)
+        if p.length_code is None
+    }
+
+
+def _to_cloud(path: str, header: _Header, xyz: np.ndarray, attributes: dict[str, np.ndarray]) -> Cloud:
+    rows, cols = header.info.get("num_rows", ""), header.info.get("num_cols", "")
+    shape = (int(rows), int(cols)) if rows.isdecimal() and cols.isdecimal() else None
+    if shape is not None and shape[0] * shape[1] != len(xyz):
+        shape = None  # Stanford's range grids list only the valid points of the grid
+    viewpoint = None
+    if "viewpoint" in header.info:
+        words = header.info["viewpoint"].split()
+        if len(words) != 3 or not all(number_of(word) and np.isfinite(float(word)) for word in words):
+            raise FormatError(f"{path}: obj_info viewpoint {' '.join(words)!r}; three finite numbers are needed")
+        viewpoint = np.array(words, np.float64)
+    metadata = {"ply_comments": tuple(header.comments)} if header.comments else {}
+    return Cloud(xyz, attributes, shape, viewpoint, header.info.get("crs") or None, metadata)
+
+
+def write(path: str | os.PathLike[str] | BinaryIO, cloud: Cloud) -> None:
+    """Write a binary little-endian PLY file.
+
+    Coordinates become float when that is exact for all of them, else double. Attributes keep their type where PLY has
+    it; bool becomes uchar, float16 float, and 64-bit integers the smallest of int, uint and double that holds them exactly.
+    (N, C) attributes become ``name_0 .. name_{C-1}``. Organized shape (``num_cols``, ``num_rows``, the Stanford
+    convention), viewpoint and CRS go into ``obj_info`` lines.
+
+    Parameters
+    ----------
+    path : path or binary file
+    cloud : Cloud
+
+    Raises
+    ------
+    FormatError
+        If PLY cannot hold an attribute without loss.
+    OSError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> from io import BytesIO
+    >>> import numpy as np
+    >>> file = BytesIO()
+    >>> write(file, Cloud(np.eye(3)))
+    >>> file.getvalue().splitlines()[2]
+    b'element vertex 3'
+    """
+    columns = dict(zip("xyz", cloud.xyz.T, strict=True))
+    types = dict.fromkeys("xyz", "f4" if fits_float32(cloud.xyz) else "f8")
+    for name, values in flat_attributes(cloud, path).items():
+        columns[name], types[name] = values, _lossless_type(path, name, values)
+    header = _header(cloud, types).encode()
+    dtype = np.dtype([(name, "<" + code) for name, code in types.items()])
+    if isinstance(path, (str, os.PathLike)):
+        with replacing(path) as file:
+            file.write(header)
+            write_binary(file, dtype, columns)
+    else:
+        path.write(header)
+        write_binary(path, dtype, columns)
+
+
+def _header(cloud: Cloud, types: dict[str, str]) -> str:
+    lines = ["ply", "format binary_little_endian 1.0"]
+    lines += [f"comment {one_line(comment)}" for comment in cloud.metadata.get("ply_comments", ())]
+    if cloud.shape is not None:
+        lines += [f"obj_info num_cols {cloud.shape[1]}", f"obj_info num_rows {cloud.shape[0]}"]
+    if cloud.viewpoint is not None:
+        lines.append("obj_info viewpoint " + " ".join(map(repr, cloud.viewpoint.tolist())))
+    if cloud.crs:
+        lines.append(f"obj_info crs {one_line(cloud.crs)}")
+    lines.append(f"element vertex {len(cloud)}")
+    lines += [f"property {_NAMES[code]} {name}" for name, code in types.items()]
+    return "\n".join([*lines, "end_header", ""])
+
+
+def _lossless_type(path: object, name: str, values: np.ndarray) -> str:
+    """Return the PLY type that holds every value exactly, the values' own type where PLY has it."""
+    code = values.dtype.kind + str(values.dtype.itemsize)
+    if code in _NAMES:
+        return code
+    if code in ("b1", "f2"):
+        return {"b1": "u1", "f2": "f4"}[code]
+    for candidate in ("i4", "u4") if code in ("i8", "u8") else ():
+        bounds = np.iinfo(candidate)
+        if not len(values) or (int(values.min()) >= bounds.min and int(values.max()) <= bounds.max):
+            return candidate
+    # Doubles hold integers exactly up to 2^53; long doubles only where they are doubles.
+    as_double = values.astype(np.float64)
+    exact = np.abs(as_double) <= 2.0**53 if values.dtype.kind in "iu" else (as_double == values) | np.isnan(values)
+    if not exact.all():
+        raise FormatError(
+            f"{path}: attribute {name!r} ({values.dtype}) does not fit a PLY type exactly; write .npz instead"
+        )
+    return "f8"
