@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, NoReturn
 
 from edgel.cloud import Cloud
-from edgel.io import depth, e57, npy, pcd, ply, text
+from edgel.io import depth, e57, e57_write, npy, pcd, ply, text
 from edgel.io.depth import Intrinsics, read_intrinsics
 from edgel.io.errors import FormatError
 from edgel.io.files import check_readable, describe
@@ -55,7 +55,7 @@ WRITERS: dict[str, Callable[[Any, Cloud], None]] = {
     **dict.fromkeys(_TEXT, text.write),
     ".npy": npy.write_npy,
     ".npz": npy.write_npz,
-    ".e57": e57.write,
+    ".e57": e57_write.write,
 }
 """Functions ``(path, cloud)`` by extension, lower case."""
 
@@ -77,8 +77,8 @@ def read(
     Parameters
     ----------
     path : path or binary file
-        PLY, PCD, LAS, LAZ (COPC too), XYZ, TXT, CSV, ASC, PTS, NPY, NPZ, E57, or a depth image (PNG, TIFF, NPY). An open
-        binary file (``sys.stdin.buffer``) is read as PLY.
+        PLY, PCD, LAS, LAZ (COPC too), XYZ, TXT, CSV, ASC, PTS, NPY, NPZ, E57, or a depth image (PNG, TIFF, NPY). An
+        open binary file (``sys.stdin.buffer``) is read as PLY.
     intrinsics : Intrinsics or path, optional
         The camera of a depth image, or the JSON file that holds it; see `edgel.io.depth.read`.
 
@@ -124,7 +124,8 @@ def write(path: str | os.PathLike[str] | BinaryIO, cloud: Cloud) -> None:
     Parameters
     ----------
     path : path or binary file
-        PLY, PCD, LAS, LAZ, XYZ, TXT, CSV, ASC, PTS, NPY, NPZ or E57. An open binary file (``sys.stdout.buffer``) gets PLY.
+        PLY, PCD, LAS, LAZ, XYZ, TXT, CSV, ASC, PTS, NPY, NPZ or E57. An open binary file (``sys.stdout.buffer``) gets
+        PLY.
     cloud : Cloud
         What each format keeps is said in its module; values are never rounded silently, save to the grid of LAS.
 

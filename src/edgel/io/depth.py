@@ -64,8 +64,8 @@ def read_intrinsics(path: str | os.PathLike[str]) -> Intrinsics:
     """Read camera intrinsics from a JSON file.
 
     Understood are ``fx fy cx cy`` (also with a leading underscore, as the perception library's .intr files have them),
-    a 3 x 3 ``camera_matrix``, ``K`` or ``intrinsic_matrix`` of rows or of nine numbers (Open3D's, column by column), and
-    beside them ``width``, ``height`` and ``depth_scale``.
+    a 3 x 3 ``camera_matrix``, ``K`` or ``intrinsic_matrix`` of rows or of nine numbers (Open3D's, column by column),
+    and beside them ``width``, ``height`` and ``depth_scale``.
 
     Raises
     ------
@@ -137,8 +137,8 @@ def read(path: str | os.PathLike[str], *, intrinsics: Intrinsics | str | os.Path
     path : path
         PNG or TIFF of one 16-bit, 32-bit or float channel, or .npy (H, W).
     intrinsics : Intrinsics or path, optional
-        The camera, or the JSON file that holds it (see `read_intrinsics`). Without it the one ``*.intr`` or ``intrinsics.json``
-        in the image's folder is used, if there is exactly one.
+        The camera, or the JSON file that holds it (see `read_intrinsics`). Without it the one ``*.intr`` or
+        ``intrinsics.json`` in the image's folder is used, if there is exactly one.
 
     Returns
     -------

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import re
-import uuid
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
@@ -13,18 +11,13 @@ from typing import Any
 import numpy as np
 
 from edgel.cloud import Cloud
-from edgel.io.columns import flat_attributes
+from edgel.io.e57_write import CARTESIAN, GRID, NAMES, PREFIX, SPHERICAL, library
 from edgel.io.errors import FormatError
-from edgel.io.files import reading, replacing, wrong_magic
+from edgel.io.files import reading, wrong_magic
 
-_CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
-_SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
-_NAMES = {"colorRed": "red", "colorGreen": "green", "colorBlue": "blue"}
-_GRID = ("rowIndex", "columnIndex")
-# Attributes that E57 itself does not define are written under this prefix of ours.
-_PREFIX, _URI = "edgel", "https://edgel.readthedocs.io/e57"
 # What the smallest integer type that holds a field's bounds is looked for among.
-_INTEGERS = [np.dtype(code) for code in ("u1", "i1", "u2", "i2", "u4", "i4", "i8")]
+# long long, since pye57 takes NumPy's int64 (a C long) for 32 bits.
+_INTEGERS = [np.dtype(code) for code in ("u1", "i1", "u2", "i2", "u4", "i4", "longlong")]
 
 
 @dataclass(frozen=True)
@@ -33,16 +26,6 @@ class _Scan:
     attributes: dict[str, np.ndarray]
     invalid: np.ndarray  # (N,) bool
     position: np.ndarray | None  # of the scanner, None when the file does not say
-
-
-def _library(path: object) -> ModuleType:
-    try:
-        from pye57 import libe57
-    except ImportError as error:
-        raise FormatError(
-            f"{path}: E57 files need the package pye57 ({error}); install it with `pip install edgel[e57]`"
-        ) from None
-    return libe57
 
 
 def read(path: str | os.PathLike[str]) -> Cloud:
@@ -55,12 +38,12 @@ def read(path: str | os.PathLike[str]) -> Cloud:
     Returns
     -------
     Cloud
-        Cartesian or spherical coordinates as x, y, z in the file's frame (metres). Numeric fields become attributes by their names
-        (``colorRed`` as ``red`` and so on; those of an extension keep its prefix); a field that only some scans have is NaN
-        or 0 in the others. ``scan_index`` tells the scan when there are several. Of one scan the scanner's position is the viewpoint,
-        if it has a pose or spherical coordinates, and a complete grid of rowIndex and columnIndex makes the cloud organized.
-        Points the scanner marked invalid are NaN in an organized cloud and left out otherwise; their number is
-        ``metadata["e57_num_invalid"]``.
+        Cartesian or spherical coordinates as x, y, z in the file's frame (metres). Numeric fields become attributes by
+        their names (``colorRed`` as ``red`` and so on; those of an extension keep its prefix); a field that only some
+        scans have is NaN or 0 in the others. ``scan_index`` tells the scan when there are several. Of one scan the
+        scanner's position is the viewpoint, if it has a pose or spherical coordinates, and a complete grid of rowIndex
+        and columnIndex makes the cloud organized. Points the scanner marked invalid are NaN in an organized cloud and
+        left out otherwise; their number is ``metadata["e57_num_invalid"]``.
 
     Raises
     ------
@@ -71,7 +54,7 @@ def read(path: str | os.PathLike[str]) -> Cloud:
     --------
     >>> import tempfile, numpy as np
     >>> with tempfile.TemporaryDirectory() as folder:  # doctest: +SKIP
-    ...     write(f"{folder}/a.e57", Cloud(np.eye(3)))
+    ...     edgel.io.write(f"{folder}/a.e57", edgel.Cloud(np.eye(3)))
     ...     read(f"{folder}/a.e57")
     Cloud(3 points, unorganized; attributes: none)
     """
@@ -84,7 +67,7 @@ def read(path: str | os.PathLike[str]) -> Cloud:
     declared = int.from_bytes(head[16:24], "little")
     if declared > size:
         raise FormatError(f"{name}: declared {declared} bytes, found {size}; the file is cut off: get it again")
-    lib = _library(name)
+    lib = library(name)
     try:
         scans = _read_scans(name, lib, size)
     except FormatError:
@@ -153,13 +136,13 @@ def _field_type(lib: ModuleType, node: Any) -> tuple[np.dtype | None, int]:
 
 def _place(path: str, node: Any, columns: dict[str, np.ndarray]) -> _Scan:
     """Turn a scan's fields into coordinates in the file's frame and attributes."""
-    if all(name in columns for name in _CARTESIAN):
-        xyz = np.column_stack([columns.pop(name).astype(np.float64) for name in _CARTESIAN])
+    if all(name in columns for name in CARTESIAN):
+        xyz = np.column_stack([columns.pop(name).astype(np.float64) for name in CARTESIAN])
         state, position = "cartesianInvalidState", None
-        for name in (*_SPHERICAL, "sphericalInvalidState"):
+        for name in (*SPHERICAL, "sphericalInvalidState"):
             columns.pop(name, None)  # the same points a second time
-    elif all(name in columns for name in _SPHERICAL):
-        distance, azimuth, elevation = (columns.pop(name).astype(np.float64) for name in _SPHERICAL)
+    elif all(name in columns for name in SPHERICAL):
+        distance, azimuth, elevation = (columns.pop(name).astype(np.float64) for name in SPHERICAL)
         flat = distance * np.cos(elevation)
         xyz = np.column_stack([flat * np.cos(azimuth), flat * np.sin(azimuth), distance * np.sin(elevation)])
         state, position = "sphericalInvalidState", np.zeros(3)
@@ -170,8 +153,10 @@ def _place(path: str, node: Any, columns: dict[str, np.ndarray]) -> _Scan:
     if node.isDefined("pose"):
         rotation, position = _pose(node["pose"])
         xyz = xyz @ rotation.T + position
-    prefix = _PREFIX + ":"
-    return _Scan(xyz, {_NAMES.get(n, n).removeprefix(prefix): c for n, c in columns.items()}, invalid, position)
+    prefix = PREFIX + ":"
+    named = {NAMES.get(n, n).removeprefix(prefix): c for n, c in columns.items()}
+    named = {n: c.astype(np.int64) if c.dtype == np.longlong else c for n, c in named.items()}
+    return _Scan(xyz, named, invalid, position)
 
 
 def _pose(node: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -200,7 +185,7 @@ def _merge(scans: list[_Scan]) -> Cloud:
     if len(scans) == 1 and (order := _grid_order(scans[0])) is not None:
         scan, (rows, shape) = scans[0], order
         xyz = np.where(scan.invalid[:, None], np.nan, scan.xyz)[rows]
-        attributes = {name: values[rows] for name, values in scan.attributes.items() if name not in _GRID}
+        attributes = {name: values[rows] for name, values in scan.attributes.items() if name not in GRID}
         return Cloud(xyz, attributes, shape, scan.position, None, metadata)
     names = dict.fromkeys(name for scan in scans for name in scan.attributes)
     attributes = {name: np.concatenate([_column(scan, name, scans) for scan in scans]) for name in names}
@@ -220,9 +205,9 @@ def _column(scan: _Scan, name: str, scans: list[_Scan]) -> np.ndarray:
 
 def _grid_order(scan: _Scan) -> tuple[np.ndarray, tuple[int, int]] | None:
     """Return the row-major order and the shape of a scan whose indices fill a grid, else None."""
-    if any(name not in scan.attributes or not len(scan.xyz) for name in _GRID):
+    if any(name not in scan.attributes or not len(scan.xyz) for name in GRID):
         return None
-    row, col = (scan.attributes[name].astype(np.int64) for name in _GRID)
+    row, col = (scan.attributes[name].astype(np.int64) for name in GRID)
     row, col = row - row.min(), col - col.min()
     shape = int(row.max()) + 1, int(col.max()) + 1
     if min(shape) < 2 or shape[0] * shape[1] != len(row):
@@ -230,124 +215,3 @@ def _grid_order(scan: _Scan) -> tuple[np.ndarray, tuple[int, int]] | None:
     cell = row * shape[1] + col
     order = np.argsort(cell, kind="stable")
     return (order, shape) if np.array_equal(cell[order], np.arange(len(cell))) else None
-
-
-def write(path: str | os.PathLike[str], cloud: Cloud) -> None:
-    """Write an E57 file of one scan, coordinates in double precision.
-
-    ``red green blue`` become ``colorRed`` and so on; attributes E57 does not define are written in an extension of
-    the name ``edgel``. An organized cloud keeps its shape through ``rowIndex`` and ``columnIndex``; points that are not
-    finite are marked invalid. The viewpoint goes into the scan's pose.
-
-    Parameters
-    ----------
-    path : path
-    cloud : Cloud
-
-    Raises
-    ------
-    FormatError
-        If an attribute cannot be stored, or pye57 is not installed.
-    OSError
-        If the file cannot be written.
-
-    Examples
-    --------
-    >>> import tempfile, numpy as np
-    >>> with tempfile.TemporaryDirectory() as folder:  # doctest: +SKIP
-    ...     write(f"{folder}/a.e57", Cloud(np.eye(3), viewpoint=np.array([0, 0, 5])))
-    ...     read(f"{folder}/a.e57").viewpoint
-    array([0., 0., 5.])
-    """
-    lib = _library(path)
-    if not len(cloud):
-        raise FormatError(f"{os.fspath(path)}: E57 cannot hold a scan without points; write .ply or .npz instead")
-    columns = _fields(path, cloud)
-    with replacing(path) as file:
-        try:
-            image = lib.ImageFile(file.name, "w")
-        except lib.E57Exception as error:
-            raise OSError(f"{os.fspath(path)}: cannot be written ({error})") from None
-        try:
-            _write_scan(lib, image, columns, cloud.viewpoint)
-        finally:
-            image.close()
-
-
-def _fields(path: object, cloud: Cloud) -> dict[str, np.ndarray]:
-    finite = np.isfinite(cloud.xyz).all(axis=1)
-    position = np.zeros(3) if cloud.viewpoint is None else cloud.viewpoint
-    xyz = np.where(finite[:, None], cloud.xyz - position, 0.0)
-    columns: dict[str, np.ndarray] = dict(zip(_CARTESIAN, np.ascontiguousarray(xyz.T), strict=True))
-    if not finite.all():
-        columns["cartesianInvalidState"] = np.where(finite, 0, 2).astype(np.int8)
-    if cloud.shape is not None:
-        rows, cols = np.divmod(np.arange(len(cloud)), cloud.shape[1])
-        columns.update(rowIndex=rows, columnIndex=cols)
-    standard = {short: long for long, short in _NAMES.items()} | {"intensity": "intensity"}
-    for name, values in flat_attributes(cloud, path).items():
-        field = standard.get(name, f"{_PREFIX}:" + re.sub(r"[^\w.-]", "_", name))
-        if not re.fullmatch(rf"({_PREFIX}:)?[A-Za-z_][A-Za-z0-9_.-]*", field) or field in columns:
-            raise FormatError(f"{path}: attribute {name!r} has a name that E57 cannot hold or has twice; rename it")
-        if values.dtype.kind == "u" and values.dtype.itemsize == 8 and int(values.max()) > np.iinfo(np.int64).max:
-            raise FormatError(
-                f"{path}: attribute {name!r} exceeds 64-bit signed integers, E57's widest; write .npz instead"
-            )
-        columns[field] = values
-    return columns
-
-
-def _write_scan(lib: ModuleType, image: Any, columns: dict[str, np.ndarray], viewpoint: np.ndarray | None) -> None:
-    image.extensionsAdd("", lib.E57_V1_0_URI)
-    image.extensionsAdd(_PREFIX, _URI)
-    root = image.root()
-    root.set("formatName", lib.StringNode(image, "ASTM E57 3D Imaging Data File"))
-    root.set("guid", lib.StringNode(image, f"{{{uuid.uuid4()}}}"))
-    root.set("versionMajor", lib.IntegerNode(image, lib.E57_FORMAT_MAJOR))
-    root.set("versionMinor", lib.IntegerNode(image, lib.E57_FORMAT_MINOR))
-    root.set("e57LibraryVersion", lib.StringNode(image, lib.E57_LIBRARY_ID))
-    scans = lib.VectorNode(image, True)
-    root.set("data3D", scans)
-    scan = lib.StructureNode(image)
-    scan.set("guid", lib.StringNode(image, f"{{{uuid.uuid4()}}}"))
-    scan.set("name", lib.StringNode(image, "edgel"))
-    if viewpoint is not None:
-        scan.set("pose", _pose_node(lib, image, viewpoint))
-    prototype, count = lib.StructureNode(image), len(columns[_CARTESIAN[0]])
-    buffers, arrays = lib.VectorSourceDestBuffer(), []
-    for name, values in columns.items():
-        node, array = _field_node(lib, image, values)
-        prototype.set(name, node)
-        arrays.append(array)  # the buffer only points to it
-        buffers.append(lib.SourceDestBuffer(image, name, array, count, True, True))
-    points = lib.CompressedVectorNode(image, prototype, lib.VectorNode(image, True))
-    scan.set("points", points)
-    scans.append(scan)
-    writer = points.writer(buffers)
-    writer.write(count)
-    writer.close()
-
-
-def _pose_node(lib: ModuleType, image: Any, viewpoint: np.ndarray) -> Any:
-    pose, rotation, translation = (lib.StructureNode(image) for _ in range(3))
-    for axis, value in zip("wxyz", (1.0, 0.0, 0.0, 0.0), strict=True):
-        rotation.set(axis, lib.FloatNode(image, value))
-    for axis, value in zip("xyz", viewpoint.tolist(), strict=True):
-        translation.set(axis, lib.FloatNode(image, value))
-    pose.set("rotation", rotation)
-    pose.set("translation", translation)
-    return pose
-
-
-def _field_node(lib: ModuleType, image: Any, values: np.ndarray) -> tuple[Any, np.ndarray]:
-    """Return the prototype of a field and its values in a type that libe57 takes."""
-    if values.dtype.kind == "f":
-        array = np.ascontiguousarray(values, np.float64 if values.dtype.itemsize > 4 else np.float32)
-        precision = lib.FloatPrecision.E57_DOUBLE if array.itemsize == 8 else lib.FloatPrecision.E57_SINGLE
-        return lib.FloatNode(image, 0.0, precision), array
-    array = np.ascontiguousarray(values, np.int64)
-    low, high = int(array.min()), int(array.max())
-    if values.dtype.kind in "iu" and values.dtype.itemsize < 8:
-        # The type's own bounds, so that it comes back as the same type.
-        low, high = int(np.iinfo(values.dtype).min), int(np.iinfo(values.dtype).max)
-    return lib.IntegerNode(image, low, low, high), array

@@ -32,7 +32,7 @@ def _foreign_errors(path: object, doing: str) -> Iterator[None]:
     except (KeyboardInterrupt, SystemExit, GeneratorExit):
         raise
     except BaseException as error:
-        # A panic of lazrs (Rust) is a BaseException, so that `except Exception` lets it through; other BaseExceptions pass.
+        # A panic of lazrs (Rust) is a BaseException, which `except Exception` lets through; others of its kind pass.
         panic = type(error).__name__ == "PanicException"
         if not isinstance(error, Exception) and not panic:
             raise
@@ -54,8 +54,9 @@ def read(path: str | os.PathLike[str]) -> Cloud:
     Returns
     -------
     Cloud
-        Every dimension but X, Y, Z as an attribute by laspy's name, bit fields and extra dimensions too. The CRS is WKT or
-        ``EPSG:n`` if the file has one; ``metadata["las_header"]`` is laspy's header, with scales and offsets, for `write`.
+        Every dimension but X, Y, Z as an attribute by laspy's name, bit fields and extra dimensions too. The CRS is WKT
+        or ``EPSG:n`` if the file has one; ``metadata["las_header"]`` is laspy's header, with scales and offsets, for
+        `write`.
 
     Raises
     ------
@@ -121,11 +122,11 @@ def write(path: str | os.PathLike[str], cloud: Cloud) -> None:
     """Write a LAS file, or a LAZ file when the name ends in ``.laz``.
 
     A cloud read from LAS keeps its header: version, point format, CRS, and scales and offsets as long as all points
-    still lie on their grid. Otherwise the scale is the smallest power of ten for which the extent fits 32-bit integers (0.001 mm
-    for a kilometre in metres), and the offset the largest round number below the smallest coordinate. Attributes
-    that LAS does not know become extra dimensions; so does, as ``<name>_exact``, one whose values the dimension of
-    its name cannot hold (an intensity of 0..1). Organized shape and viewpoint are not kept, LAS has no place for them. COPC is
-    written as plain LAZ.
+    still lie on their grid. Otherwise the scale is the smallest power of ten for which the extent fits 32-bit integers
+    (0.001 mm for a kilometre in metres), and the offset the largest round number below the smallest coordinate.
+    Attributes that LAS does not know become extra dimensions; so does, as ``<name>_exact``, one whose values the
+    dimension of its name cannot hold (an intensity of 0..1). Organized shape and viewpoint are not kept, LAS has no
+    place for them. COPC is written as plain LAZ.
 
     Parameters
     ----------
@@ -179,7 +180,7 @@ def _header_for(cloud: Cloud, attributes: dict[str, np.ndarray]) -> laspy.LasHea
             setattr(header, field, getattr(given, field))
         header.global_encoding.value = given.global_encoding.value
         header.scales, header.offsets = np.array(given.scales), np.array(given.offsets)
-        # COPC's own records describe an octree that plain LAZ has not; laspy writes those of compression and extra bytes anew.
+        # COPC's own records describe an octree that plain LAZ has not; laspy writes compression and extra bytes anew.
         kept = [vlr for vlr in given.vlrs if vlr.user_id not in ("copc", "laszip encoded")]
         header.vlrs = VLRList([vlr for vlr in kept if type(vlr).__name__ != "ExtraBytesVlr"])
         for extra in given.point_format.extra_dimensions:
@@ -283,7 +284,7 @@ def _grid(xyz: np.ndarray, header: laspy.LasHeader) -> tuple[np.ndarray, np.ndar
 
 
 def _finest(low: float, high: float) -> tuple[float, float]:
-    """Return the smallest power of ten that counts from an offset to `high` in 31 bits, and the round offset below `low`."""
+    """Return the smallest power of ten that reaches `high` in 31 bits, and the round offset below `low` it counts from."""
     extent = max(high - low, np.finfo(float).eps * max(abs(low), abs(high)), 1e-12)
     unit = 10.0 ** np.ceil(np.log10(extent))
     offset = float(np.floor(low / unit) * unit)

@@ -32,8 +32,8 @@ def read_npy(path: str | os.PathLike[str]) -> Cloud:
     Returns
     -------
     Cloud
-        From (N, 3); (N, 4..16), where the further columns become ``column_3`` onwards; (H, W, 3), organized; (N,) or (H, W)
-        records with fields x, y, z; or a wider (H, W), a depth image (see `edgel.io.depth.read`).
+        From (N, 3); (N, 4..16), where the further columns become ``column_3`` onwards; (H, W, 3), organized; (N,) or
+        (H, W) records with fields x, y, z; or a wider (H, W), a depth image (see `edgel.io.depth.read`).
 
     Raises
     ------
@@ -131,8 +131,8 @@ def read_npz(path: str | os.PathLike[str]) -> Cloud:
     Returns
     -------
     Cloud
-        Coordinates from key ``xyz`` or ``points``, (N, 3) or (H, W, 3); ``shape``, ``viewpoint`` and ``crs`` as `write_npz` writes
-        them; every other array whose first axis is N (or whose first two are H, W) is an attribute.
+        Coordinates from key ``xyz`` or ``points``, (N, 3) or (H, W, 3); ``shape``, ``viewpoint`` and ``crs`` as
+        `write_npz` writes them; every other array whose first axis is N (or whose first two are H, W) is an attribute.
 
     Raises
     ------
@@ -201,7 +201,7 @@ def _assemble(cloud: Cloud, arrays: dict[str, np.ndarray]) -> Cloud:
 
 
 def write_npz(path: str | os.PathLike[str], cloud: Cloud) -> None:
-    """Write a .npz file: ``xyz`` (N, 3) float64, each attribute under its name, ``shape``, ``viewpoint`` and ``crs`` if known.
+    """Write a .npz file: ``xyz`` (N, 3) float64, attributes by their names, ``shape``, ``viewpoint``, ``crs`` if known.
 
     Parameters
     ----------

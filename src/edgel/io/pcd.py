@@ -4,36 +4,22 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import dataclass
 from typing import BinaryIO
 
 import numpy as np
 
 from edgel.cloud import Cloud
-from edgel.io.columns import find_xyz, fits_float32, flat_attributes
+from edgel.io.columns import fits_float32, flat_attributes
 from edgel.io.errors import FormatError
-from edgel.io.files import reading, replacing, wrong_magic
+from edgel.io.files import reading, replacing
 from edgel.io.lzf import lzf_decompress
-from edgel.io.rows import number_of, parse_text, read_binary, reject_row, remaining_bytes, write_binary
+from edgel.io.pcd_header import Header, read_header
+from edgel.io.rows import parse_text, read_binary, reject_row, remaining_bytes, write_binary
 
-_TYPES = {"F": ("4", "8"), "I": ("1", "2", "4", "8"), "U": ("1", "2", "4", "8")}
 _IDENTITY = (1.0, 0.0, 0.0, 0.0)
 _COLORS = ("red", "green", "blue")
 # LZF packs at most 264 bytes into three.
 _MAX_LZF_RATIO = 88
-
-
-@dataclass(frozen=True)
-class _Header:
-    dtype: np.dtype
-    padding: list[str]
-    axes: list[str]
-    width: int
-    height: int
-    count: int
-    viewpoint: tuple[float, ...] | None
-    data: str
-    num_lines: int
 
 
 def read(path: str | os.PathLike[str]) -> Cloud:
@@ -46,10 +32,11 @@ def read(path: str | os.PathLike[str]) -> Cloud:
     Returns
     -------
     Cloud
-        Fields as attributes of their own type, (N, C) where COUNT is C; padding fields (``_``) left out. Packed ``rgb`` or
-        ``rgba`` becomes ``red``, ``green``, ``blue`` (uint8), and ``alpha`` from ``rgba`` when it is not 0 or 255
-        throughout. HEIGHT above 1 makes the cloud organized. The translation of VIEWPOINT is the viewpoint; all seven numbers are in
-        ``metadata["pcd_viewpoint"]``. Coordinates of an ascii file are parsed as double even where SIZE is 4.
+        Fields as attributes of their own type, (N, C) where COUNT is C; padding fields (``_``) left out. Packed ``rgb``
+        or ``rgba`` becomes ``red``, ``green``, ``blue`` (uint8), and ``alpha`` from ``rgba`` when it is not 0 or 255
+        throughout. HEIGHT above 1 makes the cloud organized. The translation of VIEWPOINT is the viewpoint; all seven
+        numbers are in ``metadata["pcd_viewpoint"]``. Coordinates of an ascii file are parsed as double even where SIZE
+        is 4.
 
     Raises
     ------
@@ -66,7 +53,7 @@ def read(path: str | os.PathLike[str]) -> Cloud:
     """
     name = os.fspath(path)
     with reading(path) as file:
-        header = _read_header(name, file)
+        header = read_header(name, file)
         body = {"ascii": _read_ascii, "binary": _read_plain, "binary_compressed": _read_compressed}[header.data]
         xyz, fields = body(name, file, header)
     attributes: dict[str, np.ndarray] = {}
@@ -81,88 +68,12 @@ def read(path: str | os.PathLike[str]) -> Cloud:
     return Cloud(xyz, attributes, shape, viewpoint, None, metadata)
 
 
-def _read_header(path: str, file: BinaryIO) -> _Header:
-    entries: dict[str, list[str]] = {}
-    num_lines, head = 0, b""
-    while "DATA" not in entries:
-        line = file.readline(1 << 16)
-        head += line
-        num_lines += 1
-        words = line.decode("utf-8", "replace").split("#")[0].split()
-        if words and words[0].upper() in ("VERSION", "FIELDS", "COLUMNS", "SIZE", "TYPE", "COUNT", "WIDTH", "HEIGHT",
-                                          "VIEWPOINT", "POINTS", "DATA"):  # fmt: skip
-            entries[words[0].upper()] = words[1:]
-        elif words or not line or len(head) > 1 << 20:
-            break
-    if not re.match(rb"\s*(#\s*\.PCD|#|VERSION\s|FIELDS\s|COLUMNS\s)", head, re.IGNORECASE) or not entries:
-        wrong_magic(path, "a PCD file (it has no PCD header)", head + file.read(512))
-    if "DATA" not in entries:
-        raise FormatError(f"{path}: the PCD header breaks off at line {num_lines}, before DATA; get the file again")
-    return _parse_header(path, entries, num_lines)
-
-
-def _parse_header(path: str, entries: dict[str, list[str]], num_lines: int) -> _Header:
-    fields = entries.get("FIELDS") or entries.get("COLUMNS") or []  # COLUMNS: PCD before 0.6
-    sizes, types = entries.get("SIZE", []), entries.get("TYPE", [])
-    counts = entries.get("COUNT", ["1"] * len(fields))
-    if not fields or not len(fields) == len(sizes) == len(types) == len(counts):
-        found = f"{len(fields)} FIELDS, {len(sizes)} SIZE, {len(types)} TYPE, {len(counts)} COUNT"
-        raise FormatError(f"{path}: the PCD header does not fit together ({found}); mend or re-export the file")
-    axes = find_xyz(fields)
-    if axes is None:
-        raise FormatError(f"{path}: the PCD fields are {' '.join(fields)}; x, y and z are needed")
-    layout, padding = [], []
-    for i, (field, size, kind, count) in enumerate(zip(fields, sizes, types, counts, strict=True)):
-        if size not in _TYPES.get(kind.upper(), ()) or not count.isdecimal() or not 0 < int(count) < 1 << 20:
-            raise FormatError(
-                f"{path}: PCD field {field!r} has TYPE {kind} SIZE {size} COUNT {count}; mend or re-export the file"
-            )
-        if field == "_":
-            padding.append(f"_{i}")
-        shape = () if count == "1" else (int(count),)
-        layout.append((f"_{i}" if field == "_" else field, "<" + kind.lower() + size, shape))
-    names = [name for name, _, _ in layout]
-    if len(set(names)) < len(names) or any(shape for name, _, shape in layout if name in axes):
-        raise FormatError(
-            f"{path}: PCD fields {' '.join(fields)}: a name twice, or a coordinate of several values; rename it"
-        )
-    width, height, points = _extent(path, entries)
-    data = entries["DATA"][0].lower() if entries["DATA"] else ""
-    if data not in ("ascii", "binary", "binary_compressed"):
-        raise FormatError(
-            f"{path}: PCD DATA is {data!r}; ascii, binary or binary_compressed is known: re-export the file"
-        )
-    view = entries.get("VIEWPOINT")
-    if view is not None and (len(view) != 7 or not all(number_of(w) and np.isfinite(float(w)) for w in view)):
-        raise FormatError(f"{path}: PCD VIEWPOINT is {' '.join(view)!r}; seven finite numbers are needed")
-    viewpoint = tuple(map(float, view)) if view else None
-    return _Header(np.dtype(layout), padding, axes, width, height, points, viewpoint, data, num_lines)
-
-
-def _extent(path: str, entries: dict[str, list[str]]) -> tuple[int, int, int]:
-    numbers = {}
-    for key in ("WIDTH", "HEIGHT", "POINTS"):
-        words = entries.get(key)
-        if words is not None and (len(words) != 1 or not words[0].isdecimal()):
-            raise FormatError(f"{path}: PCD {key} is {' '.join(words)!r}; one whole number is needed")
-        if words:
-            numbers[key] = int(words[0])
-    if "WIDTH" not in numbers and "POINTS" not in numbers:
-        raise FormatError(f"{path}: the PCD header has neither WIDTH nor POINTS; mend or re-export the file")
-    height = numbers.get("HEIGHT", 1)
-    width = numbers["WIDTH"] if "WIDTH" in numbers else numbers["POINTS"] // max(height, 1)
-    points = numbers.get("POINTS", width * height)
-    if width * height != points:
-        raise FormatError(f"{path}: PCD WIDTH {width} x HEIGHT {height} is not POINTS {points}; mend the header")
-    return width, height, points
-
-
 def _cut_off(path: str, declared: int, found: int) -> FormatError:
     what = "the file is cut off: get it again" if found < declared else "mend POINTS, WIDTH and HEIGHT"
     return FormatError(f"{path}: declared {declared} points, found {found}; {what}")
 
 
-def _read_ascii(path: str, file: BinaryIO, header: _Header) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+def _read_ascii(path: str, file: BinaryIO, header: Header) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     # Commas and semicolons separate too: PDAL and spreadsheets write them.
     text = re.sub(rb"[,;]", b" ", file.read()).decode("utf-8", "replace")
     rows = [line for line in text.splitlines() if not line.isspace() and line]
@@ -184,7 +95,7 @@ def _read_ascii(path: str, file: BinaryIO, header: _Header) -> tuple[np.ndarray,
     return xyz, {name: np.ascontiguousarray(table[name]) for name in names}
 
 
-def _read_plain(path: str, file: BinaryIO, header: _Header) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+def _read_plain(path: str, file: BinaryIO, header: Header) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     found = remaining_bytes(file) // header.dtype.itemsize
     if found < header.count:
         raise _cut_off(path, header.count, found)
@@ -196,7 +107,7 @@ def _read_plain(path: str, file: BinaryIO, header: _Header) -> tuple[np.ndarray,
     return read_binary(file, np.dtype(layout), header.count, header.axes, leave_out=header.padding)
 
 
-def _read_compressed(path: str, file: BinaryIO, header: _Header) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+def _read_compressed(path: str, file: BinaryIO, header: Header) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     sizes = np.frombuffer(file.read(8), "<u4") if remaining_bytes(file) >= 8 else np.zeros(2, "<u4")
     packed_size, size = map(int, sizes)
     names = list(header.dtype.names or ())
@@ -242,8 +153,8 @@ def write(path: str | os.PathLike[str], cloud: Cloud) -> None:
     """Write a binary PCD file.
 
     Coordinates become F 4 when that is exact for all of them, else F 8 (which PCL's own point types do not read).
-    ``red``, ``green``, ``blue`` of uint8 are packed into ``rgb`` (F 4), with ``alpha`` into ``rgba`` (U 4), as PCL reads
-    them. Other attributes keep their type; bool becomes U 1 and float16 F 4; (N, C) attributes get COUNT C. The
+    ``red``, ``green``, ``blue`` of uint8 are packed into ``rgb`` (F 4), with ``alpha`` into ``rgba`` (U 4), as PCL
+    reads them. Other attributes keep their type; bool becomes U 1 and float16 F 4; (N, C) attributes get COUNT C. The
     rotation of ``metadata["pcd_viewpoint"]`` is kept; without a viewpoint the line VIEWPOINT is left out.
 
     Parameters
@@ -275,7 +186,7 @@ def write(path: str | os.PathLike[str], cloud: Cloud) -> None:
         layout.append((name, code, values.shape[1:] if values.shape[1:] != (1,) else ()))
     columns = {name: values[:, 0] if values.shape[1:] == (1,) else values for name, values in columns.items()}
     with replacing(path) as file:
-        file.write(_header(cloud, layout).encode())
+        file.write(_header_text(cloud, layout).encode())
         write_binary(file, np.dtype(layout), columns)
 
 
@@ -302,7 +213,7 @@ def _code(path: object, name: str, values: np.ndarray) -> str:
     return f"<{kind}{size}"
 
 
-def _header(cloud: Cloud, layout: list[tuple[str, str, tuple[int, ...]]]) -> str:
+def _header_text(cloud: Cloud, layout: list[tuple[str, str, tuple[int, ...]]]) -> str:
     height, width = cloud.shape or (1, len(cloud))
     lines = [
         "# .PCD v0.7 - Point Cloud Data file format",

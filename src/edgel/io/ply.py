@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
-from dataclasses import dataclass
 from io import BytesIO, TextIOWrapper
 from itertools import islice
 from typing import BinaryIO
@@ -14,46 +12,10 @@ import numpy as np
 from edgel.cloud import Cloud
 from edgel.io.columns import find_xyz, fits_float32, flat_attributes, one_line
 from edgel.io.errors import FormatError
-from edgel.io.files import reading, replacing, wrong_magic
+from edgel.io.files import reading, replacing
+from edgel.io.ply_header import NAMES, Element, Header, read_header
 from edgel.io.ply_lists import gather, walk_rows
 from edgel.io.rows import number_of, parse_text, read_binary, reject_row, remaining_bytes, write_binary
-
-_TYPES = {
-    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4", "double": "f8",
-    "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4", "float32": "f4",
-    "float64": "f8", "int64": "i8", "uint64": "u8",
-}  # fmt: skip
-_NAMES = {code: name for name, code in list(_TYPES.items())[:8]}
-_BYTE_ORDER = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
-
-
-@dataclass(frozen=True)
-class _Property:
-    name: str
-    code: str  # NumPy type of the value, or of a list's values
-    length_code: str | None  # NumPy type of a list's length, None for a scalar
-
-
-@dataclass(frozen=True)
-class _Element:
-    name: str
-    count: int
-    properties: list[_Property]
-
-    @property
-    def min_row(self) -> int:
-        """Bytes that a binary row takes at least (its lists empty)."""
-        return sum(np.dtype(p.length_code or p.code).itemsize for p in self.properties)
-
-
-@dataclass(frozen=True)
-class _Header:
-    order: str
-    ascii: bool
-    elements: list[_Element]
-    comments: list[str]
-    info: dict[str, str]
-    num_lines: int
 
 
 def read(path: str | os.PathLike[str] | BinaryIO) -> Cloud:
@@ -78,8 +40,9 @@ def read(path: str | os.PathLike[str] | BinaryIO) -> Cloud:
     Examples
     --------
     >>> from io import BytesIO
-    >>> text = b"ply\\nformat ascii 1.0\\nelement vertex 1\\nproperty float x\\nproperty float y\\nproperty float z\\nend_header\\n1 2 3\\n"
-    >>> read(BytesIO(text)).xyz
+    >>> file = BytesIO()
+    >>> write(file, Cloud([[1, 2, 3]]))
+    >>> read(BytesIO(file.getvalue())).xyz
     array([[1., 2., 3.]])
     """
     if isinstance(path, (str, os.PathLike)):
@@ -89,7 +52,7 @@ def read(path: str | os.PathLike[str] | BinaryIO) -> Cloud:
 
 
 def _read(path: str, file: BinaryIO) -> Cloud:
-    header = _read_header(path, file)
+    header = read_header(path, file)
     position = [element.name for element in header.elements].index("vertex")
     vertex = header.elements[position]
     names = [p.name for p in vertex.properties if p.length_code is None]
@@ -104,56 +67,7 @@ def _read(path: str, file: BinaryIO) -> Cloud:
     return _to_cloud(path, header, xyz, attributes)
 
 
-def _read_header(path: str, file: BinaryIO) -> _Header:
-    head = file.read(1 << 16)
-    if not re.match(rb"ply[ \t]*[\r\n]", head):
-        wrong_magic(path, "a PLY file", head[:512])
-    while not (end := re.search(rb"[\r\n]end_header[ \t]*(\r\n|\r|\n|$)", head)):
-        more = file.read(1 << 16)
-        if not more or len(head) > 1 << 24:
-            raise FormatError(f"{path}: the PLY header has no end_header; the file is cut off or damaged: get it again")
-        head += more
-    # With lines that end in a bare CR, an LF after end_header is data already.
-    bare_return = not head[: end.start()].count(b"\n")
-    file.seek(end.end(1) - (bare_return and end.group(1) == b"\r\n"))
-    lines = re.split(r"\r\n|\r|\n", head[: end.start()].decode("utf-8", "replace"))
-    return _parse_header(path, lines)
-
-
-def _parse_header(path: str, lines: list[str]) -> _Header:
-    order = ""
-    elements: list[_Element] = []
-    comments, info = [], {}
-    for number, line in enumerate(lines[1:], 2):
-        words = line.split()
-        match words:
-            case []:
-                pass
-            case ["comment", *_]:
-                comments.append(line.strip()[8:])
-            case ["obj_info", *rest]:
-                info[rest[0] if rest else ""] = line.strip().split(None, 2)[2] if len(rest) > 1 else ""
-            case ["format", kind, _] if kind in _BYTE_ORDER:
-                order = kind
-            case ["element", name, count] if count.isascii() and count.isdigit():
-                elements.append(_Element(name, int(count), []))
-            case ["property", "list", length, kind, name] if elements and kind in _TYPES and length in _TYPES:
-                elements[-1].properties.append(_Property(name, _TYPES[kind], _TYPES[length]))
-            case ["property", kind, name] if elements and kind in _TYPES:
-                elements[-1].properties.append(_Property(name, _TYPES[kind], None))
-            case _:
-                raise FormatError(f"{path}: header line {number} is no PLY: {line[:60]!r}; mend or re-export the file")
-    if not order:
-        raise FormatError(f"{path}: the PLY header names no format; mend or re-export the file")
-    if "vertex" not in [element.name for element in elements]:
-        found = ", ".join(element.name for element in elements) or "nothing"
-        raise FormatError(
-            f"{path}: the PLY file has no vertices (its elements: {found}); export the points as vertices"
-        )
-    return _Header(_BYTE_ORDER[order], order == "ascii", elements, comments, info, len(lines) + 1)
-
-
-def _check_size(path: str, header: _Header, vertex: _Element, file: BinaryIO) -> None:
+def _check_size(path: str, header: Header, vertex: Element, file: BinaryIO) -> None:
     """Compare what the header promises with the file's size, before anything is allocated."""
     size = remaining_bytes(file)
     row = 2 * len(vertex.properties) if header.ascii else vertex.min_row
@@ -167,7 +81,7 @@ def _cut_off(path: str, declared: int, found: int) -> FormatError:
 
 
 def _read_ascii(
-    path: str, file: BinaryIO, header: _Header, skipped: list[_Element], vertex: _Element, axes: list[str]
+    path: str, file: BinaryIO, header: Header, skipped: list[Element], vertex: Element, axes: list[str]
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     # CR alone ends lines too: universal newlines, as the header.
     text = TextIOWrapper(file, "utf-8", "replace", newline=None)
@@ -191,7 +105,7 @@ def _read_ascii(
     return xyz, {p.name: np.ascontiguousarray(table[p.name]) for p in scalars if p.name not in axes}
 
 
-def _without_lists(path: str, row: str, vertex: _Element) -> str:
+def _without_lists(path: str, row: str, vertex: Element) -> str:
     words = row.split()
     kept, position = [], 0
     for p in vertex.properties:
@@ -209,7 +123,7 @@ def _without_lists(path: str, row: str, vertex: _Element) -> str:
 
 
 def _read_binary(
-    path: str, file: BinaryIO, header: _Header, skipped: list[_Element], vertex: _Element, axes: list[str]
+    path: str, file: BinaryIO, header: Header, skipped: list[Element], vertex: Element, axes: list[str]
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     for element in skipped:
         _skip(path, file, header, element)
@@ -222,7 +136,7 @@ def _read_binary(
     return read_binary(file, dtype, vertex.count, axes)
 
 
-def _skip(path: str, file: BinaryIO, header: _Header, element: _Element) -> None:
+def _skip(path: str, file: BinaryIO, header: Header, element: Element) -> None:
     if not any(p.length_code for p in element.properties):
         if element.count * element.min_row > remaining_bytes(file):
             raise FormatError(
@@ -233,9 +147,7 @@ def _skip(path: str, file: BinaryIO, header: _Header, element: _Element) -> None
     _walk(path, file, header, element, keep=False)
 
 
-def _walk(
-    path: str, file: BinaryIO, header: _Header, element: _Element, *, keep: bool
-) -> tuple[np.ndarray, np.ndarray]:
+def _walk(path: str, file: BinaryIO, header: Header, element: Element, *, keep: bool) -> tuple[np.ndarray, np.ndarray]:
     """Pass over an element with lists; return the bytes it lies in and where each value begins."""
     if element.count * element.min_row > remaining_bytes(file):
         raise _cut_off(path, element.count, remaining_bytes(file) // element.min_row)
@@ -254,7 +166,7 @@ def _walk(
     return data, offsets
 
 
-def _read_with_lists(path: str, file: BinaryIO, header: _Header, vertex: _Element) -> dict[str, np.ndarray]:
+def _read_with_lists(path: str, file: BinaryIO, header: Header, vertex: Element) -> dict[str, np.ndarray]:
     data, offsets = _walk(path, file, header, vertex, keep=True)
     return {
         p.name: gather(data, offsets[:, i], np.dtype(header.order + p.code))
@@ -263,7 +175,7 @@ def _read_with_lists(path: str, file: BinaryIO, header: _Header, vertex: _Elemen
     }
 
 
-def _to_cloud(path: str, header: _Header, xyz: np.ndarray, attributes: dict[str, np.ndarray]) -> Cloud:
+def _to_cloud(path: str, header: Header, xyz: np.ndarray, attributes: dict[str, np.ndarray]) -> Cloud:
     rows, cols = header.info.get("num_rows", ""), header.info.get("num_cols", "")
     shape = (int(rows), int(cols)) if rows.isdecimal() and cols.isdecimal() else None
     if shape is not None and shape[0] * shape[1] != len(xyz):
@@ -282,9 +194,9 @@ def write(path: str | os.PathLike[str] | BinaryIO, cloud: Cloud) -> None:
     """Write a binary little-endian PLY file.
 
     Coordinates become float when that is exact for all of them, else double. Attributes keep their type where PLY has
-    it; bool becomes uchar, float16 float, and 64-bit integers the smallest of int, uint and double that holds them exactly.
-    (N, C) attributes become ``name_0 .. name_{C-1}``. Organized shape (``num_cols``, ``num_rows``, the Stanford
-    convention), viewpoint and CRS go into ``obj_info`` lines.
+    it; bool becomes uchar, float16 float, and 64-bit integers the smallest of int, uint and double that holds them
+    exactly. (N, C) attributes become ``name_0 .. name_{C-1}``. Organized shape (``num_cols``, ``num_rows``, the
+    Stanford convention), viewpoint and CRS go into ``obj_info`` lines.
 
     Parameters
     ----------
@@ -311,7 +223,7 @@ def write(path: str | os.PathLike[str] | BinaryIO, cloud: Cloud) -> None:
     types = dict.fromkeys("xyz", "f4" if fits_float32(cloud.xyz) else "f8")
     for name, values in flat_attributes(cloud, path).items():
         columns[name], types[name] = values, _lossless_type(path, name, values)
-    header = _header(cloud, types).encode()
+    header = _header_text(cloud, types).encode()
     dtype = np.dtype([(name, "<" + code) for name, code in types.items()])
     if isinstance(path, (str, os.PathLike)):
         with replacing(path) as file:
@@ -322,7 +234,7 @@ def write(path: str | os.PathLike[str] | BinaryIO, cloud: Cloud) -> None:
         write_binary(path, dtype, columns)
 
 
-def _header(cloud: Cloud, types: dict[str, str]) -> str:
+def _header_text(cloud: Cloud, types: dict[str, str]) -> str:
     lines = ["ply", "format binary_little_endian 1.0"]
     lines += [f"comment {one_line(comment)}" for comment in cloud.metadata.get("ply_comments", ())]
     if cloud.shape is not None:
@@ -332,14 +244,14 @@ def _header(cloud: Cloud, types: dict[str, str]) -> str:
     if cloud.crs:
         lines.append(f"obj_info crs {one_line(cloud.crs)}")
     lines.append(f"element vertex {len(cloud)}")
-    lines += [f"property {_NAMES[code]} {name}" for name, code in types.items()]
+    lines += [f"property {NAMES[code]} {name}" for name, code in types.items()]
     return "\n".join([*lines, "end_header", ""])
 
 
 def _lossless_type(path: object, name: str, values: np.ndarray) -> str:
     """Return the PLY type that holds every value exactly, the values' own type where PLY has it."""
     code = values.dtype.kind + str(values.dtype.itemsize)
-    if code in _NAMES:
+    if code in NAMES:
         return code
     if code in ("b1", "f2"):
         return {"b1": "u1", "f2": "f4"}[code]

@@ -31,7 +31,7 @@ class _Layout:
 
 
 def read(path: str | os.PathLike[str]) -> Cloud:
-    """Read a text of points, one a line.
+    r"""Read a text of points, one a line.
 
     Separator (white space, comma, semicolon), decimal comma, comments (``#``, ``//``), a first line with the number
     of points (PTS) and a header are found out.
@@ -43,9 +43,10 @@ def read(path: str | os.PathLike[str]) -> Cloud:
     Returns
     -------
     Cloud
-        Columns by the names of the header (``r g b`` become ``red green blue``). Without a header the first three columns
-        are x, y, z; three last columns of integers 0..255 are ``red green blue`` (uint8), a single column between or
-        after is ``intensity``, any others are ``column_3`` onwards. Columns of integers are int64, others float64.
+        Columns by the names of the header (``r g b`` become ``red green blue``). Without a header the first three
+        columns are x, y, z; three last columns of integers 0..255 are ``red green blue`` (uint8), a single column
+        between or after is ``intensity``, any others are ``column_3`` onwards. Columns of integers are int64, others
+        float64.
 
     Raises
     ------
@@ -57,7 +58,7 @@ def read(path: str | os.PathLike[str]) -> Cloud:
     >>> import tempfile, pathlib
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     file = pathlib.Path(folder, "a.csv")
-    ...     _ = file.write_text("x;y;z;label\\n1,5;2,5;3,5;7\\n")
+    ...     _ = file.write_text("x;y;z;label\n1,5;2,5;3,5;7\n")
     ...     cloud = read(file)
     >>> cloud.xyz, cloud.attributes["label"]
     (array([[1.5, 2.5, 3.5]]), array([7]))
@@ -229,7 +230,7 @@ def _bytes_of_colors(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def write(path: str | os.PathLike[str], cloud: Cloud) -> None:
-    """Write a text of points: a header line, then one point a line, in the shortest digits that read back exactly.
+    r"""Write a text of points: a header line, then one point a line, in the shortest digits that read back exactly.
 
     ``.csv`` is separated by commas, everything else by blanks. ``.pts`` begins with the number of points, and has its
     column names in a comment when they are not the usual ``x y z [intensity] [red green blue]``. (N, C) attributes
@@ -254,7 +255,7 @@ def write(path: str | os.PathLike[str], cloud: Cloud) -> None:
     ...     file = pathlib.Path(folder, "a.xyz")
     ...     write(file, Cloud([[0.1, 2, 3]], {"label": np.array([7])}))
     ...     file.read_text()
-    'x y z label\\n0.1 2.0 3.0 7\\n'
+    'x y z label\n0.1 2.0 3.0 7\n'
     """
     suffix = os.path.splitext(path)[1].lower()
     separator = "," if suffix == ".csv" else " "

@@ -1,0 +1,108 @@
+"""The header of a PCD file: its fields, extent, viewpoint and kind of data."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import BinaryIO
+
+import numpy as np
+
+from edgel.io.columns import find_xyz
+from edgel.io.errors import FormatError
+from edgel.io.files import wrong_magic
+from edgel.io.rows import number_of
+
+_TYPES = {"F": ("4", "8"), "I": ("1", "2", "4", "8"), "U": ("1", "2", "4", "8")}
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a PCD header says; `axes` are the fields of x, y and z, `padding` those to leave out."""
+
+    dtype: np.dtype
+    padding: list[str]
+    axes: list[str]
+    width: int
+    height: int
+    count: int
+    viewpoint: tuple[float, ...] | None
+    data: str
+    num_lines: int
+
+
+def read_header(path: str, file: BinaryIO) -> Header:
+    """Read the header and leave the file where the data begins; FormatError if there is none or it is broken."""
+    entries: dict[str, list[str]] = {}
+    num_lines, head = 0, b""
+    while "DATA" not in entries:
+        line = file.readline(1 << 16)
+        head += line
+        num_lines += 1
+        words = line.decode("utf-8", "replace").split("#")[0].split()
+        if words and words[0].upper() in ("VERSION", "FIELDS", "COLUMNS", "SIZE", "TYPE", "COUNT", "WIDTH", "HEIGHT",
+                                          "VIEWPOINT", "POINTS", "DATA"):  # fmt: skip
+            entries[words[0].upper()] = words[1:]
+        elif words or not line or len(head) > 1 << 20:
+            break
+    if not re.match(rb"\s*(#\s*\.PCD|#|VERSION\s|FIELDS\s|COLUMNS\s)", head, re.IGNORECASE) or not entries:
+        wrong_magic(path, "a PCD file (it has no PCD header)", head + file.read(512))
+    if "DATA" not in entries:
+        raise FormatError(f"{path}: the PCD header breaks off at line {num_lines}, before DATA; get the file again")
+    return _parse_header(path, entries, num_lines)
+
+
+def _parse_header(path: str, entries: dict[str, list[str]], num_lines: int) -> Header:
+    fields = entries.get("FIELDS") or entries.get("COLUMNS") or []  # COLUMNS: PCD before 0.6
+    sizes, types = entries.get("SIZE", []), entries.get("TYPE", [])
+    counts = entries.get("COUNT", ["1"] * len(fields))
+    if not fields or not len(fields) == len(sizes) == len(types) == len(counts):
+        found = f"{len(fields)} FIELDS, {len(sizes)} SIZE, {len(types)} TYPE, {len(counts)} COUNT"
+        raise FormatError(f"{path}: the PCD header does not fit together ({found}); mend or re-export the file")
+    axes = find_xyz(fields)
+    if axes is None:
+        raise FormatError(f"{path}: the PCD fields are {' '.join(fields)}; x, y and z are needed")
+    layout, padding = [], []
+    for i, (field, size, kind, count) in enumerate(zip(fields, sizes, types, counts, strict=True)):
+        if size not in _TYPES.get(kind.upper(), ()) or not count.isdecimal() or not 0 < int(count) < 1 << 20:
+            raise FormatError(
+                f"{path}: PCD field {field!r} has TYPE {kind} SIZE {size} COUNT {count}; mend or re-export the file"
+            )
+        if field == "_":
+            padding.append(f"_{i}")
+        shape = () if count == "1" else (int(count),)
+        layout.append((f"_{i}" if field == "_" else field, "<" + kind.lower() + size, shape))
+    names = [name for name, _, _ in layout]
+    if len(set(names)) < len(names) or any(shape for name, _, shape in layout if name in axes):
+        raise FormatError(
+            f"{path}: PCD fields {' '.join(fields)}: a name twice, or a coordinate of several values; rename it"
+        )
+    width, height, points = _extent(path, entries)
+    data = entries["DATA"][0].lower() if entries["DATA"] else ""
+    if data not in ("ascii", "binary", "binary_compressed"):
+        raise FormatError(
+            f"{path}: PCD DATA is {data!r}; ascii, binary or binary_compressed is known: re-export the file"
+        )
+    view = entries.get("VIEWPOINT")
+    if view is not None and (len(view) != 7 or not all(number_of(w) and np.isfinite(float(w)) for w in view)):
+        raise FormatError(f"{path}: PCD VIEWPOINT is {' '.join(view)!r}; seven finite numbers are needed")
+    viewpoint = tuple(map(float, view)) if view else None
+    return Header(np.dtype(layout), padding, axes, width, height, points, viewpoint, data, num_lines)
+
+
+def _extent(path: str, entries: dict[str, list[str]]) -> tuple[int, int, int]:
+    numbers = {}
+    for key in ("WIDTH", "HEIGHT", "POINTS"):
+        words = entries.get(key)
+        if words is not None and (len(words) != 1 or not words[0].isdecimal()):
+            raise FormatError(f"{path}: PCD {key} is {' '.join(words)!r}; one whole number is needed")
+        if words:
+            numbers[key] = int(words[0])
+    if "WIDTH" not in numbers and "POINTS" not in numbers:
+        raise FormatError(f"{path}: the PCD header has neither WIDTH nor POINTS; mend or re-export the file")
+    height = numbers.get("HEIGHT", 1)
+    width = numbers["WIDTH"] if "WIDTH" in numbers else numbers["POINTS"] // max(height, 1)
+    points = numbers.get("POINTS", width * height)
+    if width * height != points:
+        raise FormatError(f"{path}: PCD WIDTH {width} x HEIGHT {height} is not POINTS {points}; mend the header")
+    return width, height, points
