@@ -25,31 +25,26 @@ class NeighborIndex:
     order : (N,) int64
         Row of the input of each sorted point.
     xyz : (3, N) float64, C-contiguous
-        Sorted coordinates relative to `origin`, one axis a row so that distances are computed by SIMD.
+        Sorted coordinates, one axis a row so that distances are computed by SIMD.
     boxes : (2 L, 6) float64
         Lower and upper corner of each node: node 1 is the root, node i has children 2 i and 2 i + 1, leaves begin at
         L; leaf i holds the sorted points from ``i N // L`` to ``(i + 1) N // L``.
-    origin : (3,) float64
-        Subtracted from every coordinate, so that large ones (UTM) keep their digits.
     """
 
     order: np.ndarray
     xyz: np.ndarray
     boxes: np.ndarray
-    origin: np.ndarray
 
     def __len__(self) -> int:
         return len(self.order)
 
 
-def build_index(xyz: np.ndarray, origin: np.ndarray | None = None) -> NeighborIndex:
+def build_index(xyz: np.ndarray) -> NeighborIndex:
     """Sort points for neighbour queries.
 
     Parameters
     ----------
     xyz : (N, 3) float64, finite, N > 0
-    origin : (3,) float64, optional
-        Subtracted from the coordinates; default the middle of their bounding box.
 
     Returns
     -------
@@ -62,12 +57,10 @@ def build_index(xyz: np.ndarray, origin: np.ndarray | None = None) -> NeighborIn
     >>> len(index), index.boxes.shape
     (1000, (128, 6))
     """
-    if origin is None:
-        origin = middle_of_bounds(xyz)
     count = len(xyz)
     by_axis = np.empty((3, count))
     order = np.empty(count, np.int64)
-    run_slices(_load, count, xyz, origin, by_axis, order, size=65536)
+    run_slices(_load, count, xyz, by_axis, order, size=65536)
     depth = max(-(-count // BUCKET) - 1, 0).bit_length()
     boxes = np.empty((2 << depth, 6))
     shared = min(depth, _SHARED_LEVELS)
@@ -75,13 +68,7 @@ def build_index(xyz: np.ndarray, origin: np.ndarray | None = None) -> NeighborIn
         run_slices(_split_level, 1 << level, level, by_axis, order, size=1)
     run_slices(_split_subtrees, 1 << shared, shared, depth, by_axis, order, boxes, size=1)
     _inner_boxes(1 << depth, boxes)
-    return NeighborIndex(order, by_axis, boxes, origin)
-
-
-def middle_of_bounds(xyz: np.ndarray) -> np.ndarray:
-    """Return the middle (3,) of the bounding box of (N, 3) points."""
-    lower, upper = bounds(xyz)
-    return lower + (upper - lower) / 2
+    return NeighborIndex(order, by_axis, boxes)
 
 
 def bounds(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -106,11 +93,11 @@ def _bounds(start, stop, xyz, size, parts):
 
 
 @kernel
-def _load(start, stop, xyz, origin, by_axis, order):
+def _load(start, stop, xyz, by_axis, order):
     for p in range(start, stop):
         order[p] = p
         for axis in range(3):
-            by_axis[axis, p] = xyz[p, axis] - origin[axis]
+            by_axis[axis, p] = xyz[p, axis]
 
 
 @kernel

@@ -49,7 +49,7 @@ def knn(index: NeighborIndex, queries: np.ndarray, num_neighbors: int) -> Neighb
     >>> knn(build_index(cloud), cloud[:5], 2).rows[:, 0]
     array([0, 1, 2, 3, 4])
     """
-    sorted_queries = build_index(queries, index.origin)
+    sorted_queries = build_index(queries)
     rows = np.empty((len(queries), num_neighbors), np.int64)
     distances = np.empty((len(queries), num_neighbors))
     run_chunks(_knn, sorted_queries, index, rows, distances)

@@ -115,13 +115,13 @@ def plane_fits(index: NeighborIndex, xyz: np.ndarray, num_neighbors: int) -> Nor
     k = check_num_neighbors(num_neighbors, len(index))
     if len(xyz) == 0:
         return Normals(np.empty((0, 3)), np.empty(0), np.empty(0), np.empty(0))
-    return fit_planes(index, build_index(xyz, index.origin), k)
+    return fit_planes(index, build_index(xyz), k)
 
 
 def fit_planes(index: NeighborIndex, queries: NeighborIndex, num_neighbors: int) -> Normals:
     """Fit planes at sorted queries, which may be the index itself; results in the queries' own order."""
     planes = np.empty((len(queries), 6))
-    run_chunks(_fit_planes, queries, index, num_neighbors, index.origin, planes)
+    run_chunks(_fit_planes, queries, index, num_neighbors, planes)
     normals = np.ascontiguousarray(planes[:, :3])
     return Normals(normals, planes[:, 3].copy(), planes[:, 4].copy(), planes[:, 5].copy())
 
@@ -160,17 +160,21 @@ def smallest_eigenpair(xx, xy, xz, yy, yz, zz):
 
     Closed form (Smith 1961, doi:10.1145/355578.366316), then Rayleigh quotients, which undo the rounding of the arccos.
     """
+    scale = max(abs(xx), abs(yy), abs(zz), abs(xy), abs(xz), abs(yz))
+    if scale == 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 1.0
+    xx, xy, xz, yy, yz, zz = xx / scale, xy / scale, xz / scale, yy / scale, yz / scale, zz / scale
     mean = (xx + yy + zz) / 3.0
     dx, dy, dz = xx - mean, yy - mean, zz - mean
     p = math.sqrt((dx * dx + dy * dy + dz * dz + 2.0 * (xy * xy + xz * xz + yz * yz)) / 6.0)
-    if p == 0.0:
-        return mean, mean, 0.0, 0.0, 1.0
+    if p < 1e-100:  # three equal eigenvalues
+        return mean * scale, mean * scale, 0.0, 0.0, 1.0
     det = dx * (dy * dz - yz * yz) - xy * (xy * dz - yz * xz) + xz * (xy * yz - dy * xz)
     angle = math.acos(min(max(det / (2.0 * p * p * p), -1.0), 1.0)) / 3.0
+    largest = mean + 2.0 * p * math.cos(angle)
     smallest = mean + 2.0 * p * math.cos(angle + 2.0943951023931953)
-    middle = 3.0 * mean - smallest - (mean + 2.0 * p * math.cos(angle))
     x, y, z = _orthogonal_to_largest(xx - smallest, xy, xz, yy - smallest, yz, zz - smallest)
-    for _ in range(3):
+    for step in range(4):
         a, b, c = xx - smallest, yy - smallest, zz - smallest
         # Every column of the adjugate of A - lambda I points along the eigenvector; the longest is the safest.
         ax, ay, az = b * c - yz * yz, a * c - xz * xz, a * b - xy * xy
@@ -182,11 +186,12 @@ def smallest_eigenpair(xx, xy, xz, yy, yz, zz):
         else:
             u, v, w = kxz, kyz, az
         length = math.sqrt(u * u + v * v + w * w)
-        if length <= 1e-14 * p * p:  # the two smallest are equal: any direction across the largest will do
+        if length > 1e-14 * p * p:
+            x, y, z = u / length, v / length, w / length
+        elif step > 0:  # the two smallest are equal: any direction across the largest will do
             break
-        x, y, z = u / length, v / length, w / length
         smallest = x * (xx * x + xy * y + xz * z) + y * (xy * x + yy * y + yz * z) + z * (xz * x + yz * y + zz * z)
-    return smallest, middle, x, y, z
+    return smallest * scale, (3.0 * mean - smallest - largest) * scale, x, y, z
 
 
 @kernel
@@ -210,7 +215,7 @@ def _orthogonal_to_largest(a, xy, xz, b, yz, c):
 
 
 @kernel
-def _fit_planes(start, stop, leaves, queries, query_order, xyz, order, boxes, k, origin, planes):
+def _fit_planes(start, stop, leaves, queries, query_order, xyz, order, boxes, k, planes):
     best, rows = np.empty((BUCKET, k)), np.empty((BUCKET, k), np.int64)
     stack, reaches, distances = np.empty(64, np.int64), np.empty(64), np.empty(BUCKET)
     for leaf in range(start, stop):
@@ -240,6 +245,6 @@ def _fit_planes(start, stop, leaves, queries, query_order, xyz, order, boxes, k,
                 plane[:] = np.nan
                 continue
             plane[0], plane[1], plane[2] = nx, ny, nz
-            plane[3] = nx * (x + mx + origin[0]) + ny * (y + my + origin[1]) + nz * (z + mz + origin[2])
+            plane[3] = nx * (x + mx) + ny * (y + my) + nz * (z + mz)
             plane[4] = max(smallest, 0.0)
             plane[5] = max(smallest, 0.0) / trace

@@ -1,0 +1,145 @@
+"""The slow, obvious version of every step: plain loops straight from the equations, the oracle of the kernels.
+
+Pixels are counted from 1 as in the paper, and images are indexed ``f[j - 1][i - 1]``.
+"""
+
+import math
+
+import numpy as np
+
+
+def pixel_coordinates(x, y, xmin, xmax, ymin, ymax, W, H):
+    """Eq. 3-4, floored to half-open cells; the last column and row take xmax and ymax."""
+    i = math.floor(W * (x - xmin) / (xmax - xmin)) + 1
+    j = math.floor(H * (y - ymin) / (ymax - ymin)) + 1
+    return min(i, W), min(j, H)
+
+
+def project(points, W, H, gray_min):
+    """Eq. 1-6: the grey image of a cloud; 0 where no point falls, the highest point where several do."""
+    xmin, ymin, zmin = (min(p[a] for p in points) for a in range(3))
+    xmax, ymax, zmax = (max(p[a] for p in points) for a in range(3))
+    f = [[0.0] * W for _ in range(H)]
+    top = {}
+    for x, y, z in points:
+        pixel = pixel_coordinates(x, y, xmin, xmax, ymin, ymax, W, H)
+        top[pixel] = max(top.get(pixel, -math.inf), z)
+    for (i, j), z in top.items():
+        f[j - 1][i - 1] = gray_min + (255 - gray_min) * (z - zmin) / (zmax - zmin) if zmax > zmin else 255.0
+    return np.array(f)
+
+
+def gaussian_kernel(k, sigma):
+    """Eq. 7 over (2k + 1) x (2k + 1), then divided by its sum."""
+    size = 2 * k + 1
+    h = np.zeros((size, size))
+    for i in range(1, size + 1):
+        for j in range(1, size + 1):
+            h[i - 1, j - 1] = math.exp(-((i - (k + 1)) ** 2 + (j - (k + 1)) ** 2) / (2 * sigma**2))
+            h[i - 1, j - 1] /= 2 * math.pi * sigma**2
+    return h / h.sum()
+
+
+def _at(f, row, col):
+    """A pixel, the nearest border pixel where it lies outside."""
+    return f[min(max(row, 0), f.shape[0] - 1), min(max(col, 0), f.shape[1] - 1)]
+
+
+def convolve(f, h):
+    """Eq. 12: every pixel the sum of its window weighted by h."""
+    k = h.shape[0] // 2
+    out = np.zeros(f.shape)
+    for row in range(f.shape[0]):
+        for col in range(f.shape[1]):
+            for a in range(-k, k + 1):
+                for b in range(-k, k + 1):
+                    out[row, col] += h[a + k, b + k] * _at(f, row + a, col + b)
+    return out
+
+
+def gradient(f):
+    """Eq. 15: Sobel."""
+    sobel_x = np.array([[-1, 0, 1], [-2, 0, 2], [-1, 0, 1]])
+    sobel_y = np.array([[-1, -2, -1], [0, 0, 0], [1, 2, 1]])
+    return convolve(f, sobel_x), convolve(f, sobel_y)
+
+
+def non_maximum_suppression(gx, gy):
+    """Section 3.3: of the three pixels along the gradient (rounded to 45 degrees) only the largest stays."""
+    magnitude = np.hypot(gx, gy)
+    height, width = magnitude.shape
+    out = np.zeros_like(magnitude)
+
+    def m(row, col):
+        return magnitude[row, col] if 0 <= row < height and 0 <= col < width else 0.0
+
+    for row in range(height):
+        for col in range(width):
+            theta = math.degrees(math.atan2(gy[row, col], gx[row, col])) % 180
+            here = magnitude[row, col]
+            if theta < 22.5 or theta > 157.5:
+                stays = here > m(row, col - 1) and here >= m(row, col + 1)
+            elif 67.5 < theta < 112.5:
+                stays = here > m(row - 1, col) and here >= m(row + 1, col)
+            elif theta < 90:
+                stays = here > m(row - 1, col - 1) and here > m(row + 1, col + 1)
+            else:
+                stays = here > m(row - 1, col + 1) and here > m(row + 1, col - 1)
+            out[row, col] = here if stays else 0.0
+    return out
+
+
+def hysteresis(thinned, low, high):
+    """Section 3.4 with chains: repeat the paper's neighbour rule until nothing changes."""
+    edges = thinned > high
+    changed = True
+    while changed:
+        changed = False
+        for row in range(thinned.shape[0]):
+            for col in range(thinned.shape[1]):
+                if not edges[row, col] and thinned[row, col] > low:
+                    window = edges[max(row - 1, 0) : row + 2, max(col - 1, 0) : col + 2]
+                    if window.any():
+                        edges[row, col] = changed = True
+    return edges
+
+
+def canny(f, k, sigma, low, high):
+    """Sections 3.1-3.4 in a row."""
+    gx, gy = gradient(convolve(f, gaussian_kernel(k, sigma)))
+    return hysteresis(non_maximum_suppression(gx, gy), low, high)
+
+
+def code_1(points, edges, t):
+    """The paper's Code 1, corrected: ``temp`` cleared for every pixel, each point once. Returns the set of rows."""
+    H, W = edges.shape
+    f = np.asarray(points)
+    xmin, ymin = f[:, 0].min(), f[:, 1].min()
+    xmax, ymax = f[:, 0].max(), f[:, 1].max()
+    pc = set()
+    for row, col in zip(*np.nonzero(edges), strict=True):
+        i, j = int(col) + 1, int(row) + 1
+        newx = (i - 1) * (xmax - xmin) / W + xmin  # eq. 18
+        newy = (j - 1) * (ymax - ymin) / H + ymin  # eq. 19
+        m = np.flatnonzero(np.abs(f[:, 0] - newx) < t)
+        n = np.flatnonzero(np.abs(f[:, 1] - newy) < t)
+        pc.update(np.intersect1d(m, n).tolist())
+    return pc
+
+
+def nearest(points, query, k):
+    """Rows of the k nearest points, ties to the smaller x, y, z, then to the smaller row."""
+    keys = []
+    for row, p in enumerate(points):
+        d = sum((a - b) ** 2 for a, b in zip(p, query, strict=True))
+        keys.append((d, *p, row))
+    return [key[-1] for key in sorted(keys)[:k]]
+
+
+def plane(neighbours):
+    """Eq. 20 by SVD: unit normal (sign open), D, e, and the singular values of the centred neighbours."""
+    centre = neighbours.mean(axis=0)
+    _, s, vt = np.linalg.svd(neighbours - centre)
+    normal = vt[2]
+    distances = neighbours @ normal - centre @ normal
+    return normal, normal @ centre, (distances**2).sum(), s
