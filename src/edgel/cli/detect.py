@@ -1,0 +1,198 @@
+"""``edgel detect``: find the edge points of a cloud and write them."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+import edgel
+from edgel.cli import files, options
+from edgel.cli.errors import ExitCode, Failure, exit_codes, failing_as
+from edgel.cli.output import count, print_json, print_line, print_table, seconds
+from edgel.cli.progress import Watch
+from edgel.detect import PRESETS
+from edgel.edges import EdgeKind, Edges
+from edgel.stages import Stages
+
+HELP = """Find the edge points of a cloud, their kind, and their normals.
+
+The edge points are written with all attributes of the input and [bold]edge_kind[/bold] (flags: 1 boundary, 2 occluding,
+4 occluded, 8 crease, 16 color, 32 image), [bold]edge_strength[/bold] and [bold]nx ny nz[/bold]. Lengths are in the
+cloud's unit. Without -o only the summary is shown.
+
+\b
+Examples:
+  edgel detect scan.ply -o edges.ply
+  edgel detect scan.las -o labelled.laz --all
+  edgel detect depth.png --intrinsics camera.json -o edges.ply
+  edgel detect scan.ply --preset paper --sigma 2 --report report
+  cat scan.ply | edgel detect - -o - > edges.ply
+"""
+
+_FUNCTIONS = {"default": edgel.detect, "paper": edgel.paper.detect}
+
+
+def detect(
+    source: options.Input,
+    output: Annotated[
+        str | None,
+        typer.Option("-o", "--output", metavar="OUT", help="The cloud to write; - writes PLY to stdout."),
+    ] = None,
+    preset: Annotated[
+        str, typer.Option(metavar="|".join(PRESETS), help="The method: edgel's own, or the published one.")
+    ] = options.default_of(edgel.detect, "preset"),
+    label_all: Annotated[
+        bool, typer.Option("--all", help="Write the whole cloud, labelled; edge_kind is 0 where there is no edge.")
+    ] = False,
+    report: Annotated[
+        str | None, typer.Option(metavar="DIR", help="Write a report with figures into this folder.")
+    ] = None,
+    num_neighbors: Annotated[
+        int | None, options.option(edgel.detect, "num_neighbors", "Neighbours of each plane fit, the point among them.")
+    ] = None,
+    viewpoint: options.Viewpoint = None,
+    intrinsics: options.Intrinsics = None,
+    width: Annotated[int | None, options.paper_option("width", "Pixels of the image along x.")] = None,
+    height: Annotated[int | None, options.paper_option("height", "Pixels of the image along y.")] = None,
+    kernel_size: Annotated[
+        int | None, options.paper_option("kernel_size", "Width of the Gaussian, pixels, odd.")
+    ] = None,
+    sigma: Annotated[float | None, options.paper_option("sigma", "Standard deviation of the Gaussian, pixels.")] = None,
+    low: Annotated[float | None, options.paper_option("low", "Lower threshold of the gradient, Sobel units.")] = None,
+    high: Annotated[float | None, options.paper_option("high", "Upper threshold of the gradient, Sobel units.")] = None,
+    tolerance: Annotated[
+        float | None, options.paper_option("tolerance", "Half the window around an edge pixel, the cloud's unit.")
+    ] = None,
+    gray_min: Annotated[float | None, options.paper_option("gray_min", "Grey of the lowest point, 0 to 255.")] = None,
+    as_json: options.AsJson = False,
+    debug: options.Debug = False,
+) -> None:
+    """Find the edge points of a cloud."""
+    given = {
+        "num_neighbors": num_neighbors,
+        "viewpoint": viewpoint,
+        "width": width,
+        "height": height,
+        "kernel_size": kernel_size,
+        "sigma": sigma,
+        "low": low,
+        "high": high,
+        "tolerance": tolerance,
+        "gray_min": gray_min,
+    }
+    page = None
+    with exit_codes(as_json=as_json, debug=debug):
+        given = check_options(preset, {name: value for name, value in given.items() if value is not None})
+        check_outputs(output, report, label_all=label_all, as_json=as_json)
+        files.check_input(source, intrinsics)
+        with Watch() as watch:
+            stages = Stages(watch)
+            with stages("reading"):
+                cloud = files.read_cloud(source, intrinsics)
+            with failing_as(ExitCode.DATA, source):
+                edges = _FUNCTIONS[preset](cloud, **given, progress=watch)
+            stages.seconds.update(edges.seconds)
+            if output is not None:
+                with stages("writing"):
+                    files.write_cloud(output, edges.label(cloud) if label_all else edges.cloud(cloud))
+            if report is not None:
+                with stages("report"):
+                    page = write_report(source, cloud, edges, report)
+        facts = collect(source, output, report, edges, stages.seconds)
+        if as_json:
+            print_json(facts)
+        print_table(f"Edges of {source}", summary(edges, stages.seconds))
+        if output is not None:
+            what = "the whole cloud, labelled" if label_all else "the edge points"
+            print_line(f"{'stdout' if output == files.PIPE else output}: {what}")
+        if page is not None:
+            print_line(f"{page}: the report")
+        if output is None and report is None and not as_json:
+            print_line("nothing was written; add -o edges.ply to write the edge points", style="dim")
+
+
+def check_options(preset: str, given: dict[str, Any]) -> dict[str, Any]:
+    """Return the options given if the preset has them, else raise a `Failure` that names those it has not."""
+    if preset not in PRESETS:
+        raise Failure(ExitCode.USAGE, f"--preset: {preset!r} is unknown; choose {' or '.join(PRESETS)}")
+    foreign = [name for name in given if name not in inspect.signature(_FUNCTIONS[preset]).parameters]
+    if foreign:
+        names = ", ".join(f"--{name.replace('_', '-')}" for name in foreign)
+        others = " or ".join(
+            other for other in PRESETS if set(foreign) <= set(inspect.signature(_FUNCTIONS[other]).parameters)
+        )
+        remedy = f"add --preset {others}, or leave it out" if others else "leave it out"
+        raise Failure(ExitCode.USAGE, f"{names}: not an option of the {preset} preset; {remedy}")
+    return given
+
+
+def check_outputs(output: str | None, report: str | None, *, label_all: bool, as_json: bool) -> None:
+    """Raise a `Failure` for outputs that contradict each other or cannot be written."""
+    if label_all and output is None:
+        raise Failure(ExitCode.USAGE, "--all: says what -o writes; add -o OUT")
+    if as_json and output == files.PIPE:
+        raise Failure(ExitCode.USAGE, "--json: stdout carries the cloud already; name a file with -o")
+    if output is not None:
+        files.check_output(output)
+    if report is not None:
+        folder = Path(report)
+        files.check_folder(report, next(parent for parent in (folder, *folder.parents) if parent.exists()))
+
+
+def write_report(source: str, cloud: edgel.Cloud, edges: Edges, directory: str) -> Path:
+    """Write the report of one cloud and return its page."""
+    raise NotImplementedError
+
+
+def kinds(edges: Edges) -> dict[str, int]:
+    """Count the edge points by kind; a point of two kinds counts in both."""
+    found = {kind.name.lower(): int((edges.kind & kind > 0).sum()) for kind in EdgeKind if kind.name}
+    return {name: number for name, number in found.items() if number}
+
+
+def collect(
+    source: str, output: str | None, report: str | None, edges: Edges, by_stage: dict[str, float]
+) -> dict[str, Any]:
+    """Return what ``--json`` prints."""
+    return {
+        "input": source,
+        "output": output,
+        "report": report,
+        "preset": edges.preset,
+        "points": edges.num_points,
+        "not_finite": edges.num_dropped,
+        "edge_points": len(edges),
+        "share": edges.share,
+        "kinds": kinds(edges),
+        "normals_undefined": edges.planes.num_undefined,
+        "parameters": edges.parameters,
+        "seconds": by_stage,
+        "peak_memory_bytes": peak_memory(),
+    }
+
+
+def summary(edges: Edges, by_stage: dict[str, float]) -> list[tuple[str, ...]]:
+    """Return the rows of the table."""
+    rows: list[tuple[str, ...]] = [("points", count(edges.num_points))]
+    if edges.num_dropped:
+        rows.append(("not finite", count(edges.num_dropped), "left out"))
+    rows.append(("edge points", count(len(edges)), f"{edges.share:.1%} of the finite points"))
+    rows += [(f"  {name}", count(number)) for name, number in kinds(edges).items()]
+    if edges.planes.num_undefined:
+        rows.append(("normals undefined", count(edges.planes.num_undefined), "the neighbours span no plane"))
+    rows.append(("time", seconds(sum(by_stage.values()))))
+    return rows + [(f"  {name}", seconds(duration)) for name, duration in by_stage.items()]
+
+
+def peak_memory() -> int | None:
+    """Return the most memory this process has held, in bytes, None where the system does not tell."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return None
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak if sys.platform == "darwin" else peak * 1024

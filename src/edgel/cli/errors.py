@@ -1,0 +1,115 @@
+"""Exit codes, and how errors become messages: one line of what went wrong, and never a traceback for bad input."""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+from enum import IntEnum
+
+import typer
+
+from edgel.cli.output import print_json, print_line
+
+
+class ExitCode(IntEnum):
+    """What the exit code of every command means."""
+
+    OK = 0
+    INTERNAL = 1
+    USAGE = 2
+    INPUT = 3
+    DATA = 4
+    OUTPUT = 5
+    INTERRUPTED = 130
+
+
+class Failure(Exception):  # noqa: N818 - it is what a command ends with, bad input mostly, not an error of its own
+    """What ends a command early.
+
+    Parameters
+    ----------
+    code : ExitCode
+    message : str
+        Names the file or option, what is wrong, and the remedy.
+    """
+
+    def __init__(self, code: ExitCode, message: str) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+@contextmanager
+def failing_as(code: ExitCode, subject: str = "") -> Iterator[None]:
+    """Turn the errors that the library raises for bad input into a `Failure` with this code.
+
+    Parameters
+    ----------
+    code : ExitCode
+    subject : str
+        Put before messages that do not name a file themselves.
+    """
+    try:
+        yield
+    except Failure:
+        raise
+    except MemoryError as error:
+        remedy = "thin the cloud or cut it into parts, or use a machine with more memory"
+        raise Failure(code, _about(subject, f"not enough memory; {remedy}")) from error
+    except (ValueError, TypeError, ImportError, OSError) as error:
+        raise Failure(code, _about(subject, describe_error(error))) from error
+
+
+@contextmanager
+def exit_codes(*, as_json: bool = False, debug: bool = False) -> Iterator[None]:
+    """End the program with the code and the message of whatever goes wrong inside.
+
+    Parameters
+    ----------
+    as_json : bool
+        Whether the error also goes to stdout, as a JSON object.
+    debug : bool
+        Whether the traceback is shown.
+    """
+    try:
+        yield
+    except (typer.Exit, typer.Abort):
+        raise
+    except KeyboardInterrupt:
+        code, message = ExitCode.INTERRUPTED, "interrupted; nothing was left half written"
+    except Failure as failure:
+        code, message = failure.code, str(failure)
+        _show_traceback(debug)
+    except MemoryError:
+        code, message = ExitCode.DATA, "not enough memory; thin the cloud or cut it into parts"
+        _show_traceback(debug)
+    except Exception as error:
+        code = ExitCode.INTERNAL
+        advice = "please report it with what --debug shows"
+        message = f"an error inside edgel, not of your data ({type(error).__name__}: {error}); {advice}"
+        _show_traceback(debug)
+    else:
+        return
+    print_line(f"edgel: {message}", style="bold red")
+    if as_json:
+        print_json({"error": message, "code": int(code)})
+    raise typer.Exit(int(code))
+
+
+def describe_error(error: BaseException) -> str:
+    """Return the message of an error as a sentence, an OSError's without its number."""
+    if isinstance(error, OSError) and error.strerror:
+        what = error.strerror[:1].lower() + error.strerror[1:]
+        return f"{os.fsdecode(error.filename)}: {what}" if isinstance(error.filename, str | bytes) else what
+    return str(error) or type(error).__name__
+
+
+def _about(subject: str, message: str) -> str:
+    return message if not subject or subject in message else f"{subject}: {message}"
+
+
+def _show_traceback(debug: bool) -> None:
+    if debug:
+        traceback.print_exc(file=sys.stderr)
