@@ -1,0 +1,169 @@
+"""Pictures of clouds, drawn with NumPy: a z-buffer of discs, shaded so that the shape is seen."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from edgel.cloud import as_cloud, check_rows
+from edgel.io.files import replacing
+from edgel.scene import FINE, Scene
+
+EDGE_COLOR = (200, 0, 20)
+"""Red of the edge points, dark against the light greys, so that it is told apart without seeing red."""
+ARROW_COLOR = (0, 60, 140)
+
+_GREYS = (105, 232)  # of the darkest and the lightest slope
+_PALE = (180, 244)  # the same where arrows shall stand out
+
+
+def render(
+    points: Any,
+    *,
+    rows_on_top: Any = None,
+    direction: Any = "auto",
+    size: tuple[int, int] = (1200, 900),
+    crop: bool = False,
+    margin: float = 0.03,
+    normals: Any = None,
+    point_radius: float | None = None,
+) -> np.ndarray:
+    """Draw a cloud in grey, and some of its points in red on top of it (fig. 4 of the paper).
+
+    Parameters
+    ----------
+    points : (N, 3) or (H, W, 3) array_like, Cloud, or an object that carries points
+        Points that are not finite are left out; a few far outliers may fall outside the picture.
+    rows_on_top : (E,) int or (N,) bool, optional
+        Rows drawn red: the edge points. Those hidden behind nearer parts of the cloud are not drawn.
+    direction : {"auto", "top", "oblique", "sensor"} or (3,) array_like
+        ``"top"`` looks down -Z as the paper does, ``"sensor"`` from the cloud's viewpoint, ``"oblique"`` from the front
+        and above; ``"auto"`` takes the sensor's view where there is one. A vector points away from the viewer.
+    size : (int, int)
+        Width and height, in pixels.
+    crop : bool
+        Make the picture no larger than the cloud needs.
+    margin : float
+        Free rim, as a share of the smaller side.
+    normals : (N, 3) array_like, optional
+        Unit normals to shade by; by default the shape is taken from the picture's own depth.
+    point_radius : float, optional
+        Radius of a point, in pixels; by default chosen from the spacing, so that dense clouds have no holes.
+
+    Returns
+    -------
+    (height, width, 3) uint8
+        RGB, white where there is nothing.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If `points` carries no finite coordinates, or an option is out of its range.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from edgel import plot
+    >>> plot.render(np.random.default_rng(0).random((1000, 3)), size=(400, 300)).shape
+    (300, 400, 3)
+    """
+    scene = Scene(points, direction=direction, size=size, crop=crop, margin=margin, point_radius=point_radius)
+    picture = _greys(scene, scene.shaded_by_slope() if normals is None else scene.shaded_by_normal(normals), _GREYS)
+    if rows_on_top is not None:
+        picture[scene.on_top(check_rows(rows_on_top, scene.num_input))] = EDGE_COLOR
+    return _reduced(Image.fromarray(picture))
+
+
+def arrows(
+    points: Any,
+    at: Any,
+    normals: Any,
+    *,
+    direction: Any = "auto",
+    size: tuple[int, int] = (1200, 900),
+    crop: bool = False,
+    spacing: float = 0.035,
+    length: float = 0.08,
+) -> np.ndarray:
+    """Draw a cloud in grey, points of it in red, and the normals of an even selection of those as arrows (fig. 5).
+
+    Parameters
+    ----------
+    points, direction, size, crop
+        As for `render`.
+    at : (E,) int or (N,) bool
+        Rows of the points in red.
+    normals : (E, 3) array_like
+        Their unit normals; NaN where there is none.
+    spacing : float
+        Side of the cells of the picture that get one arrow each, as a share of its smaller side.
+    length : float
+        Length of an arrow seen from the side, in the same share; those that point at the viewer look shorter.
+
+    Returns
+    -------
+    (height, width, 3) uint8
+        RGB, white where there is nothing.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As for `render`, and if there is not one normal for each point in red.
+    """
+    rows = check_rows(at, len(as_cloud(points)))
+    normals = np.asarray(normals, float)
+    if normals.shape != (len(rows), 3):
+        raise ValueError(f"normals: expected ({len(rows)}, 3), one for each point in red, got {normals.shape}")
+    scene = Scene(points, direction=direction, size=size, crop=crop, margin=length, point_radius=None)
+    picture = _greys(scene, scene.shaded_by_slope(), _PALE)
+    picture[scene.on_top(rows)] = EDGE_COLOR
+    image = Image.fromarray(picture)
+    unit = min(scene.width, scene.height)
+    known = np.flatnonzero(np.isfinite(normals).all(axis=1))
+    chosen, starts = scene.spread(rows[known], spacing * unit)
+    along = normals[known[chosen]] @ np.column_stack([scene.camera.right, -scene.camera.up])
+    _draw_arrows(ImageDraw.Draw(image), starts, starts + along * length * unit, max(1.4 * FINE, unit / 450))
+    return _reduced(image)
+
+
+def save(path: str | os.PathLike[str], picture: np.ndarray) -> None:
+    """Write a picture (H, W, 3) uint8 as PNG, in one step.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written there.
+    """
+    with replacing(path) as file:
+        Image.fromarray(picture).save(file, format="PNG", optimize=True)
+
+
+def _greys(scene: Scene, shade: np.ndarray, greys: tuple[int, int]) -> np.ndarray:
+    """Paint the shade of a scene between two greys, on white, (height, width, 3) uint8."""
+    levels = (greys[0] + (greys[1] - greys[0]) * shade + 0.5).astype(np.uint8)
+    return np.where(scene.covered, levels, np.uint8(255))[..., None].repeat(3, axis=2)
+
+
+def _draw_arrows(draw: ImageDraw.ImageDraw, starts: np.ndarray, stops: np.ndarray, width: float) -> None:
+    """Draw a shaft and a head for each arrow, a dot where it points at the viewer."""
+    for start, stop in zip(starts, stops, strict=True):
+        length = float(np.hypot(*(stop - start)))
+        if length < 3 * width:
+            draw.ellipse([*(start - width), *(start + width)], fill=ARROW_COLOR)
+            continue
+        along = (stop - start) / length
+        across = np.array([-along[1], along[0]])
+        head = min(5.0 * width, 0.6 * length)
+        neck = stop - along * head
+        draw.line([tuple(start), tuple(neck)], fill=ARROW_COLOR, width=round(width))
+        draw.polygon(
+            [tuple(stop), tuple(neck + 0.4 * head * across), tuple(neck - 0.4 * head * across)], fill=ARROW_COLOR
+        )
+
+
+def _reduced(fine: Image.Image) -> np.ndarray:
+    """Average the fine pixels of each pixel, (H, W, 3) uint8."""
+    return np.asarray(fine.reduce(FINE))
