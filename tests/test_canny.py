@@ -1,10 +1,10 @@
 import cv2
+import naive
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import naive
 from edgel.canny import canny, gaussian_kernel, gradient, hysteresis, smooth, thin
 
 IMAGES = st.integers(0, 2**32 - 1).map(lambda seed: _random_image(np.random.default_rng(seed)))

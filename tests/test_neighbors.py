@@ -1,11 +1,11 @@
+import naive
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
-import naive
 from edgel.kdtree import bounds, build_index
 from edgel.neighbors import knn
 
@@ -42,7 +42,7 @@ KINDS = ["uniform", "surface", "lidar", "utm", "outlier", "duplicates", "line"]
 def test_distances_are_those_of_scipy(kind, k):
     points = cloud(kind)
     found = knn(build_index(points), points, k)
-    expected, _ = cKDTree(points).query(points, k)
+    expected, _ = KDTree(points).query(points, k)
     np.testing.assert_allclose(found.distances, expected.reshape(len(points), k), rtol=1e-9, atol=1e-9)
     real = np.linalg.norm(points[found.rows] - points[:, None], axis=2)
     np.testing.assert_allclose(found.distances, real, rtol=1e-6, atol=1e-9)
@@ -52,7 +52,7 @@ def test_distances_are_those_of_scipy(kind, k):
 def test_sets_are_those_of_scipy(kind):
     points = cloud(kind)
     found = knn(build_index(points), points, 16)
-    _, expected = cKDTree(points).query(points, 16)
+    _, expected = KDTree(points).query(points, 16)
     np.testing.assert_array_equal(np.sort(found.rows, axis=1), np.sort(expected, axis=1))
 
 
@@ -78,7 +78,7 @@ def test_queries_need_not_be_points_of_the_cloud():
     points = cloud("surface")
     queries = np.random.default_rng(1).normal(0, 20, (500, 3))
     found = knn(build_index(points), queries, 9)
-    expected, _ = cKDTree(points).query(queries, 9)
+    expected, _ = KDTree(points).query(queries, 9)
     np.testing.assert_allclose(found.distances, expected, rtol=1e-12)
 
 

@@ -1,13 +1,13 @@
 """The published method: its steps against the naive oracle, its result on the paper's parts, and bad input."""
 
+import naive
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 import edgel
-import naive
 from edgel import paper, synth
 from edgel.normals import by_offset
 from edgel.project import PixelGrid, back_project, grey_image, pixel_coordinates, project
@@ -96,7 +96,7 @@ def test_one_set_of_defaults_gives_about_ten_percent_of_both_parts(scan):
     away = scan.nearest_seen.distance[found.index]
     assert np.mean(away <= found.parameters["tolerance"] * np.sqrt(2)) > 0.9
     outline = np.concatenate([curve.points for curve in scan.part.edges if curve.kind != "crease"])[:, :2]
-    reached, _ = cKDTree(scan.cloud.xyz[found.index, :2]).query(outline)
+    reached, _ = KDTree(scan.cloud.xyz[found.index, :2]).query(outline)
     assert np.mean(reached < 1.0) > 0.97
 
 

@@ -1,6 +1,7 @@
-"""Canny's detector on 2-D float arrays, step by step; it knows nothing of points (Canny 1986, doi:10.1109/TPAMI.1986.4767851).
+"""Canny's detector on 2-D float arrays, step by step; it knows nothing of points.
 
-Rasters are ``[row, col]``. Outside an image its border pixels are repeated; whoever wants another border pads first.
+Canny 1986, doi:10.1109/TPAMI.1986.4767851; equation numbers are those of the paper in `edgel.paper`. Rasters are
+``[row, col]``. Outside an image its border pixels are repeated; whoever wants another border pads first.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ def canny(image: np.ndarray, *, kernel_size: int, sigma: float, low: float, high
     sigma : float
         Its standard deviation, in pixels.
     low, high : float
-        Thresholds on the gradient's magnitude, ``0 <= low <= high``: an edge begins above `high` and goes on above `low`.
+        Thresholds on the gradient's magnitude, ``0 <= low <= high``: an edge begins above `high`, goes on above `low`.
 
     Examples
     --------
@@ -80,11 +81,11 @@ def smooth(image: np.ndarray, kernel_size: int, sigma: float) -> np.ndarray:
 
 
 def gradient(image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Sobel derivatives along columns (x) and rows (y) of an (H, W) image (eq. 15; eq. 16-17 misprint their last terms).
+    """Sobel derivatives along columns (x) and rows (y) of an (H, W) image (eq. 15).
 
-    The magnitude is ``hypot(gx, gy)`` (eq. 13), the direction ``arctan2(gy, gx)`` (eq. 14).
+    Eq. 16-17 write them out with misprinted last terms. The magnitude is ``hypot(gx, gy)`` (eq. 13), the direction
+    ``arctan2(gy, gx)`` (eq. 14).
     """
-    height, width = image.shape
     padded = np.pad(image, 1, mode="edge")
     across = padded[:, 2:] - padded[:, :-2]
     gx = across[:-2] + 2 * across[1:-1] + across[2:]

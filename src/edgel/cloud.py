@@ -153,7 +153,9 @@ def check_points(points: Any, *, minimum: int = 3) -> Points:
     """
     xyz = as_cloud(points).xyz
     # A sum is finite only if all its terms are: one pass, no (N, 3) mask for the usual clean cloud.
-    if np.isfinite(xyz.sum()):
+    with np.errstate(over="ignore", invalid="ignore"):
+        clean = np.isfinite(xyz.sum())
+    if clean:
         rows = np.arange(len(xyz))
     else:
         rows = np.flatnonzero(np.isfinite(xyz).all(axis=1))

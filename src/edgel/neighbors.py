@@ -1,7 +1,7 @@
 """Exact nearest neighbours.
 
-Queries are answered in chunks of points that lie together, which share the walk through the tree. Ties of distance go to
-the smaller coordinates (x, then y, then z), so neighbours do not depend on the order of the input.
+Queries are answered in chunks of points that lie together, which share the walk through the tree. Ties of distance go
+to the smaller coordinates (x, then y, then z), so neighbours do not depend on the order of the input.
 """
 
 from __future__ import annotations
@@ -49,23 +49,40 @@ def knn(index: NeighborIndex, queries: np.ndarray, num_neighbors: int) -> Neighb
     >>> knn(build_index(cloud), cloud[:5], 2).rows[:, 0]
     array([0, 1, 2, 3, 4])
     """
-    sorted_queries = build_index(queries)
     rows = np.empty((len(queries), num_neighbors), np.int64)
     distances = np.empty((len(queries), num_neighbors))
-    run_chunks(_knn, sorted_queries, index, rows, distances)
+    visit_neighbors(_store, build_index(queries), index, num_neighbors, index.order, rows, distances)
     return Neighbors(rows, distances)
 
 
-def run_chunks(compiled: Callable[..., Any], queries: NeighborIndex, index: NeighborIndex, *arguments: Any) -> None:
-    """Run a kernel over chunks of queries, which are themselves sorted as an index is.
+def visit_neighbors(
+    visit: Callable[..., Any], queries: NeighborIndex, index: NeighborIndex, num_neighbors: int, *arguments: Any
+) -> None:
+    """Find the k nearest points of sorted queries and hand them to a kernel, slice by slice.
 
-    The kernel takes ``(start, stop, leaves, queries.xyz, queries.order, index.xyz, index.order, index.boxes,
-    *arguments)``, start and stop counting leaves of the queries.
+    Only a slice's neighbours exist at a time, whatever the size of the cloud.
+
+    Parameters
+    ----------
+    visit : kernel
+        Takes ``(first, places, squared, queries.xyz, queries.order, index.xyz, *arguments)``: the sorted queries from
+        `first` on, the (n, k) sorted places of their neighbours, nearest first, and the squared distances to them.
+    queries : NeighborIndex
+        Made by `build_index`; may be the index itself.
+    index : NeighborIndex
+    num_neighbors : int
+        k.
     """
     leaves = len(queries.boxes) // 2
-    run_slices(
-        compiled, leaves, leaves, queries.xyz, queries.order, index.xyz, index.order, index.boxes, *arguments, size=64
-    )
+
+    def work(start: int, stop: int) -> None:
+        first, last = node_start(start, len(queries), leaves), node_start(stop, len(queries), leaves)
+        places = np.empty((last - first, num_neighbors), np.int64)
+        squared = np.empty((last - first, num_neighbors))
+        _knn(start, stop, leaves, queries.xyz, index.xyz, index.order, index.boxes, places, squared)
+        visit(first, places, squared, queries.xyz, queries.order, index.xyz, *arguments)
+
+    run_slices(work, leaves, size=256)
 
 
 @kernel
@@ -87,35 +104,36 @@ def _first_of(xyz, order, a, b):
 
 
 @kernel
-def _scan_leaf(xyz, order, first, count, x, y, z, k, best, rows, distances):
+def _scan_leaf(xyz, order, first, count, x, y, z, best, places, distances):
     """Offer the points of a leaf to a query's list of the k best, which stays sorted."""
     px, py, pz = xyz[0], xyz[1], xyz[2]
     for i in range(count):
         dx, dy, dz = px[first + i] - x, py[first + i] - y, pz[first + i] - z
         distances[i] = dx * dx + dy * dy + dz * dz
+    k = len(best)
     worst = best[k - 1]
     for i in range(count):
         d = distances[i]
         if d <= worst:
-            row, slot = first + i, k
+            place, slot = first + i, k
             while slot > 0 and (
                 d < best[slot - 1]
-                or (d == best[slot - 1] and (rows[slot - 1] < 0 or _first_of(xyz, order, row, rows[slot - 1])))
+                or (d == best[slot - 1] and (places[slot - 1] < 0 or _first_of(xyz, order, place, places[slot - 1])))
             ):
                 slot -= 1
                 if slot < k - 1:
-                    best[slot + 1], rows[slot + 1] = best[slot], rows[slot]
+                    best[slot + 1], places[slot + 1] = best[slot], places[slot]
             if slot < k:
-                best[slot], rows[slot] = d, row
+                best[slot], places[slot] = d, place
                 worst = best[k - 1]
     return worst
 
 
 @kernel
-def knn_chunk(queries, first, count, xyz, order, boxes, k, best, rows, stack, reaches, distances):
-    """Find the k nearest of `count` queries from `first` on: squared distances in best, sorted places in rows.
+def _knn_chunk(queries, first, count, xyz, order, boxes, best, places, stack, reaches, distances):
+    """Find the k nearest of `count` queries from `first` on, which lie together, in one walk through the tree.
 
-    `stack` (64,), `reaches` (64,) and `distances` (BUCKET,) are room to work in, made once a slice by the caller.
+    `stack` (64,), `reaches` (64,) and `distances` (BUCKET,) are room to work in.
     """
     low_x, low_y, low_z = np.inf, np.inf, np.inf
     high_x, high_y, high_z = -np.inf, -np.inf, -np.inf
@@ -123,9 +141,7 @@ def knn_chunk(queries, first, count, xyz, order, boxes, k, best, rows, stack, re
         low_x, high_x = min(low_x, queries[0, q]), max(high_x, queries[0, q])
         low_y, high_y = min(low_y, queries[1, q]), max(high_y, queries[1, q])
         low_z, high_z = min(low_z, queries[2, q]), max(high_z, queries[2, q])
-    best[:] = np.inf
-    rows[:] = -1
-    num_points, leaves = xyz.shape[1], boxes.shape[0] // 2
+    k, num_points, leaves = best.shape[1], xyz.shape[1], boxes.shape[0] // 2
     reach, depth = np.inf, 1
     stack[0], reaches[0] = 1, 0.0
     while depth > 0:
@@ -151,20 +167,29 @@ def knn_chunk(queries, first, count, xyz, order, boxes, k, best, rows, stack, re
             x, y, z = queries[0, first + q], queries[1, first + q], queries[2, first + q]
             worst = best[q, k - 1]
             if _box_distance(boxes, node, x, y, z, x, y, z) <= worst:
-                worst = _scan_leaf(xyz, order, start, size, x, y, z, k, best[q], rows[q], distances)
+                worst = _scan_leaf(xyz, order, start, size, x, y, z, best[q], places[q], distances)
             reach = max(reach, worst)
 
 
 @kernel
-def _knn(start, stop, leaves, queries, query_order, xyz, order, boxes, out_rows, out_distances):
-    k = out_rows.shape[1]
-    best, rows = np.empty((BUCKET, k)), np.empty((BUCKET, k), np.int64)
+def _knn(start, stop, leaves, queries, xyz, order, boxes, places, squared):
+    """Find the k nearest of the queries in leaves start..stop-1 of their own tree."""
+    places[:] = -1
+    squared[:] = np.inf
     stack, reaches, distances = np.empty(64, np.int64), np.empty(64), np.empty(BUCKET)
+    base = node_start(start, queries.shape[1], leaves)
     for leaf in range(start, stop):
         first = node_start(leaf, queries.shape[1], leaves)
-        count = node_start(leaf + 1, queries.shape[1], leaves) - first
-        knn_chunk(queries, first, count, xyz, order, boxes, k, best, rows, stack, reaches, distances)
-        for q in range(count):
-            for i in range(k):
-                out_rows[query_order[first + q], i] = order[rows[q, i]]
-                out_distances[query_order[first + q], i] = np.sqrt(best[q, i])
+        last = node_start(leaf + 1, queries.shape[1], leaves)
+        own = slice(first - base, last - base)
+        _knn_chunk(
+            queries, first, last - first, xyz, order, boxes, squared[own], places[own], stack, reaches, distances
+        )
+
+
+@kernel
+def _store(first, places, squared, queries, query_order, xyz, order, rows, distances):
+    for q in range(places.shape[0]):
+        for i in range(places.shape[1]):
+            rows[query_order[first + q], i] = order[places[q, i]]
+            distances[query_order[first + q], i] = np.sqrt(squared[q, i])

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from edgel.cloud import as_cloud, as_vector, check_points, check_rows
-from edgel.kdtree import BUCKET, NeighborIndex, build_index, node_start
-from edgel.neighbors import knn_chunk, run_chunks
+from edgel.kdtree import NeighborIndex, build_index
+from edgel.neighbors import visit_neighbors
 from edgel.parallel import kernel
 
 # Below this share of the largest variance the middle one is rounding: the neighbours lie on a line, or on one spot.
@@ -45,6 +45,10 @@ class Normals:
     def num_undefined(self) -> int:
         """Number of points without a normal."""
         return int(np.isnan(self.offset).sum())
+
+    def take(self, rows: np.ndarray) -> Normals:
+        """Return the planes of some rows."""
+        return Normals(self.normals[rows], self.offset[rows], self.residual[rows], self.variation[rows])
 
     def flipped(self, where: np.ndarray) -> Normals:
         """Return the same planes with the normals of a (M,) mask turned round."""
@@ -97,7 +101,7 @@ def estimate_normals(points: Any, *, at: Any = None, num_neighbors: int = 16, vi
     if at is None and checked.num_dropped == 0:
         return towards(fit_planes(index, index, check_num_neighbors(num_neighbors, len(index))), checked.xyz, viewpoint)
     rows = np.arange(len(cloud)) if at is None else check_rows(at, len(cloud))
-    wanted = np.isfinite(cloud.xyz[rows]).all(axis=1)
+    wanted = np.asarray(np.isfinite(cloud.xyz[rows]).all(axis=1))
     xyz = cloud.xyz[rows[wanted]]
     planes = plane_fits(index, xyz, num_neighbors)
     return _spread(towards(planes, xyz, viewpoint), wanted)
@@ -121,7 +125,7 @@ def plane_fits(index: NeighborIndex, xyz: np.ndarray, num_neighbors: int) -> Nor
 def fit_planes(index: NeighborIndex, queries: NeighborIndex, num_neighbors: int) -> Normals:
     """Fit planes at sorted queries, which may be the index itself; results in the queries' own order."""
     planes = np.empty((len(queries), 6))
-    run_chunks(_fit_planes, queries, index, num_neighbors, planes)
+    visit_neighbors(_fit_planes, queries, index, num_neighbors, planes)
     normals = np.ascontiguousarray(planes[:, :3])
     return Normals(normals, planes[:, 3].copy(), planes[:, 4].copy(), planes[:, 5].copy())
 
@@ -156,7 +160,7 @@ def _spread(planes: Normals, wanted: np.ndarray) -> Normals:
 
 @kernel
 def smallest_eigenpair(xx, xy, xz, yy, yz, zz):
-    """Return the smallest and the middle eigenvalue of a symmetric 3 x 3 matrix, and the smallest's unit eigenvector.
+    """Return the smallest and the middle eigenvalue of a symmetric 3 x 3 matrix, and the former's unit eigenvector.
 
     Closed form (Smith 1961, doi:10.1145/355578.366316), then Rayleigh quotients, which undo the rounding of the arccos.
     """
@@ -196,7 +200,7 @@ def smallest_eigenpair(xx, xy, xz, yy, yz, zz):
 
 @kernel
 def _orthogonal_to_largest(a, xy, xz, b, yz, c):
-    """Return a unit vector across the longest row of a symmetric matrix (its largest eigenvector when its rank is 1)."""
+    """Return a unit vector across the longest row of a symmetric matrix (at rank 1, the largest eigenvector)."""
     u, v, w = a, xy, xz
     if b * b + yz * yz + xy * xy > u * u + v * v + w * w:
         u, v, w = xy, b, yz
@@ -215,36 +219,31 @@ def _orthogonal_to_largest(a, xy, xz, b, yz, c):
 
 
 @kernel
-def _fit_planes(start, stop, leaves, queries, query_order, xyz, order, boxes, k, planes):
-    best, rows = np.empty((BUCKET, k)), np.empty((BUCKET, k), np.int64)
-    stack, reaches, distances = np.empty(64, np.int64), np.empty(64), np.empty(BUCKET)
-    for leaf in range(start, stop):
-        first = node_start(leaf, queries.shape[1], leaves)
-        count = node_start(leaf + 1, queries.shape[1], leaves) - first
-        knn_chunk(queries, first, count, xyz, order, boxes, k, best, rows, stack, reaches, distances)
-        for q in range(count):
-            # Sums are taken about the query, so that they keep their digits far from the origin.
-            x, y, z = queries[0, first + q], queries[1, first + q], queries[2, first + q]
-            mx, my, mz = 0.0, 0.0, 0.0
-            for i in range(k):
-                mx += xyz[0, rows[q, i]] - x
-                my += xyz[1, rows[q, i]] - y
-                mz += xyz[2, rows[q, i]] - z
-            mx, my, mz = mx / k, my / k, mz / k
-            xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-            for i in range(k):
-                dx = xyz[0, rows[q, i]] - x - mx
-                dy = xyz[1, rows[q, i]] - y - my
-                dz = xyz[2, rows[q, i]] - z - mz
-                xx, xy, xz = xx + dx * dx, xy + dx * dy, xz + dx * dz
-                yy, yz, zz = yy + dy * dy, yz + dy * dz, zz + dz * dz
-            smallest, middle, nx, ny, nz = smallest_eigenpair(xx, xy, xz, yy, yz, zz)
-            trace = xx + yy + zz
-            plane = planes[query_order[first + q]]
-            if middle <= _FLAT * trace:
-                plane[:] = np.nan
-                continue
-            plane[0], plane[1], plane[2] = nx, ny, nz
-            plane[3] = nx * (x + mx) + ny * (y + my) + nz * (z + mz)
-            plane[4] = max(smallest, 0.0)
-            plane[5] = max(smallest, 0.0) / trace
+def _fit_planes(first, places, squared, queries, query_order, xyz, planes):
+    k = places.shape[1]
+    for q in range(places.shape[0]):
+        # Sums are taken about the query, so that they keep their digits far from the origin.
+        x, y, z = queries[0, first + q], queries[1, first + q], queries[2, first + q]
+        mx, my, mz = 0.0, 0.0, 0.0
+        for i in range(k):
+            mx += xyz[0, places[q, i]] - x
+            my += xyz[1, places[q, i]] - y
+            mz += xyz[2, places[q, i]] - z
+        mx, my, mz = mx / k, my / k, mz / k
+        xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for i in range(k):
+            dx = xyz[0, places[q, i]] - x - mx
+            dy = xyz[1, places[q, i]] - y - my
+            dz = xyz[2, places[q, i]] - z - mz
+            xx, xy, xz = xx + dx * dx, xy + dx * dy, xz + dx * dz
+            yy, yz, zz = yy + dy * dy, yz + dy * dz, zz + dz * dz
+        smallest, middle, nx, ny, nz = smallest_eigenpair(xx, xy, xz, yy, yz, zz)
+        trace = xx + yy + zz
+        plane = planes[query_order[first + q]]
+        if middle <= _FLAT * trace:
+            plane[:] = np.nan
+            continue
+        plane[0], plane[1], plane[2] = nx, ny, nz
+        plane[3] = nx * (x + mx) + ny * (y + my) + nz * (z + mz)
+        plane[4] = max(smallest, 0.0)
+        plane[5] = max(smallest, 0.0) / trace

@@ -155,20 +155,22 @@ def choose_grid(xyz: np.ndarray, width: int | None, height: int | None) -> Pixel
     for axis, name in enumerate("xy"):
         if not extent[axis] > 0:
             raise ValueError(
-                f"points: all have {name} = {lower[axis]:g}, so the vertical projection of the paper shows only a line; "
+                f"points: all have {name} = {lower[axis]:g}, so the paper's vertical projection shows only a line; "
                 "turn the cloud so that its face looks along Z, or use the default preset"
             )
-    if width is None and height is None:
-        pixel = PIXEL_SPACINGS * occupied_spacing(xyz, lower, upper)
+    if width is not None:
+        pixel = extent[0] / width
+    elif height is not None:
+        pixel = extent[1] / height
     else:
-        pixel = extent[0] / width if width is not None else extent[1] / height
-    width = max(round(extent[0] / pixel), 1) if width is None else int(width)
-    height = max(round(extent[1] / pixel), 1) if height is None else int(height)
-    if width * height > _MAX_PIXELS:
+        pixel = PIXEL_SPACINGS * occupied_spacing(xyz, lower, upper)
+    columns = width or max(round(extent[0] / pixel), 1)
+    rows = height or max(round(extent[1] / pixel), 1)
+    if columns * rows > _MAX_PIXELS:
         raise ValueError(
-            f"width, height: an image of {width} x {height} pixels is larger than {_MAX_PIXELS:,}; give a smaller size"
+            f"width, height: an image of {columns} x {rows} pixels is larger than {_MAX_PIXELS:,}; give a smaller size"
         )
-    return PixelGrid(width, height, lower, upper)
+    return PixelGrid(int(columns), int(rows), lower, upper)
 
 
 def choose_tolerance(tolerance: float | None, grid: PixelGrid) -> float:

@@ -163,8 +163,8 @@ def _highest(pixels, xyz, highest):
 def _window(value, lower, extent, count, tolerance):
     """First and one past the last pixel along an axis whose corner is nearer than the tolerance."""
     size = extent / count
-    first = max(int(math.floor((value - tolerance - lower) / size)), 0)
-    last = min(int(math.ceil((value + tolerance - lower) / size)), count - 1)
+    first = max(math.floor((value - tolerance - lower) / size), 0)
+    last = min(math.ceil((value + tolerance - lower) / size), count - 1)
     # The division only guesses; whether a corner counts is decided by the very comparison of Code 1.
     while first <= last and not abs(value - (first * extent / count + lower)) < tolerance:
         first += 1

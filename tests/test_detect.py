@@ -1,0 +1,130 @@
+"""The default detector: what it must find today, and what must hold of any detector."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import edgel
+from edgel import EdgeKind
+
+
+def box(spacing=0.02, seed=0):
+    """The faces of a unit cube, each a jittered lattice that stays a little inside the face."""
+    rng = np.random.default_rng(seed)
+    a = np.arange(0, 1 + spacing / 2, spacing)
+    u, v = (g.ravel() for g in np.meshgrid(a, a))
+    faces = [np.c_[u, v, np.full_like(u, w)][:, axes] for w in (0.0, 1.0) for axes in ([0, 1, 2], [0, 2, 1], [2, 0, 1])]
+    points = np.concatenate(faces) + rng.uniform(-0.05, 0.05, (6 * len(u), 3)) * spacing
+    return np.unique(np.round(points, 9), axis=0)
+
+
+def to_nearest_cube_edge(points):
+    gap = np.sort(np.minimum(np.abs(points), np.abs(points - 1)), axis=1)
+    return np.hypot(gap[:, 0], gap[:, 1])
+
+
+def test_the_creases_of_a_cube_are_found():
+    points = box()
+    found = edgel.detect(points)
+    crease = found.index[(found.kind & EdgeKind.CREASE) > 0]
+    assert to_nearest_cube_edge(points[crease]).max() < 0.02
+    true = to_nearest_cube_edge(points) < 0.003
+    assert np.isin(np.flatnonzero(true), crease).mean() > 0.9
+
+
+def test_the_boundary_of_a_sheet_is_found_and_nothing_else():
+    rng = np.random.default_rng(0)
+    x, y = np.meshgrid(np.arange(60.0), np.arange(40.0))
+    sheet = np.c_[x.ravel(), y.ravel(), 0.02 * x.ravel() ** 2] + rng.uniform(-0.1, 0.1, (2400, 3)) * [1, 1, 0]
+    found = edgel.detect(sheet)
+    border = (x == 0) | (x == 59) | (y == 0) | (y == 39)
+    assert (found.kind == EdgeKind.BOUNDARY).all()
+    assert np.isin(np.flatnonzero(border.ravel()), found.index).mean() > 0.95
+    near = (x <= 1) | (x >= 58) | (y <= 1) | (y >= 38)
+    assert near.ravel()[found.index].all()
+
+
+def test_a_sphere_has_none():
+    z = np.linspace(-1, 1, 5001)[1:-1]
+    turn = np.arange(len(z)) * np.pi * (3 - np.sqrt(5))  # a spiral that spreads points evenly
+    r = np.sqrt(1 - z**2)
+    assert len(edgel.detect(np.c_[r * np.cos(turn), r * np.sin(turn), z])) == 0
+
+
+def test_a_plane_parallel_to_z_is_like_any_other():
+    rng = np.random.default_rng(0)
+    x, y = np.meshgrid(np.arange(30.0), np.arange(30.0))
+    flat = np.c_[x.ravel(), y.ravel(), np.zeros(900)] + rng.uniform(-0.1, 0.1, (900, 3)) * [1, 1, 0]
+    expected = edgel.detect(flat)
+    assert 0 < len(expected) < 200
+    np.testing.assert_array_equal(edgel.detect(flat[:, [2, 0, 1]]).index, expected.index)
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_motion_scale_and_order_change_nothing(seed):
+    rng = np.random.default_rng(seed)
+    points = box(0.05)
+    expected = edgel.detect(points)
+    q, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    moved = edgel.detect(1000 * points @ q.T + rng.uniform(-1e4, 1e4, 3))
+    # Motion rounds coordinates, which only decides where a point lies on a threshold.
+    assert len(np.setxor1d(moved.index, expected.index)) <= 0.01 * len(expected) + 1
+    order = rng.permutation(len(points))
+    shuffled = edgel.detect(points[order])
+    np.testing.assert_array_equal(np.sort(order[shuffled.index]), expected.index)
+
+
+def test_any_number_of_threads_gives_the_same(monkeypatch):
+    points = box()
+    monkeypatch.setenv("EDGEL_NUM_THREADS", "1")
+    one = edgel.detect(points)
+    monkeypatch.setenv("EDGEL_NUM_THREADS", "4")
+    four = edgel.detect(points)
+    for name in ("index", "kind", "strength", "normals"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(four, name))
+
+
+def test_the_answer_is_well_formed():
+    points = np.insert(box(), 7, np.nan, axis=0)
+    found = edgel.detect(points, viewpoint=[0.5, 0.5, 9])
+    assert (np.diff(found.index) > 0).all()
+    assert found.index.min() >= 0
+    assert found.index.max() < len(points)
+    assert np.isfinite(points[found.index]).all()
+    assert ((found.strength > 0) & (found.strength <= 1)).all()
+    assert found.num_dropped == 1
+    np.testing.assert_allclose(np.linalg.norm(found.normals, axis=1), 1)
+    assert ((([0.5, 0.5, 9] - points[found.index]) * found.normals).sum(axis=1) >= 0).all()
+    everywhere = edgel.estimate_normals(points, viewpoint=[0.5, 0.5, 9])
+    np.testing.assert_array_equal(found.normals, everywhere.normals[found.index])
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        (np.empty((0, 3)), "at least 3"),
+        (np.zeros((2, 3)), "at least 3"),
+        (np.ones((50, 3)), "one line or spot"),
+        (np.c_[np.arange(50.0), np.zeros((50, 2))], "one line or spot"),
+        (np.full((50, 3), np.inf), "0 finite points of 50"),
+        (np.zeros((3, 50)), "points.T"),
+    ],
+)
+def test_bad_input_is_named_with_its_remedy(points, message):
+    with pytest.raises(ValueError, match=message):
+        edgel.detect(points)
+
+
+def test_three_points_and_repeats_are_answered():
+    assert edgel.detect(np.eye(3)).num_points == 3
+    points = np.repeat(box(0.1), 5, axis=0)
+    found = edgel.detect(points)
+    assert found.num_points == len(points)
+
+
+@pytest.mark.parametrize("options", [{"preset": "best"}, {"preset": "paper", "viewpoint": [0, 0, 1]}])
+def test_wrong_options_are_named(options):
+    with pytest.raises(ValueError, match="preset"):
+        edgel.detect(box(0.1), **options)
