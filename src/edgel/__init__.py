@@ -4,6 +4,18 @@ from edgel import paper
 from edgel.cloud import Cloud
 from edgel.detect import detect
 from edgel.edges import EdgeKind, Edges
+from edgel.io import FormatError, read, write
 from edgel.normals import Normals, estimate_normals
 
-__all__ = ["Cloud", "EdgeKind", "Edges", "Normals", "detect", "estimate_normals", "paper"]
+__all__ = [
+    "Cloud",
+    "EdgeKind",
+    "Edges",
+    "FormatError",
+    "Normals",
+    "detect",
+    "estimate_normals",
+    "paper",
+    "read",
+    "write",
+]
