@@ -284,7 +284,7 @@ def _grid(xyz: np.ndarray, header: laspy.LasHeader) -> tuple[np.ndarray, np.ndar
 
 
 def _finest(low: float, high: float) -> tuple[float, float]:
-    """Return the smallest power of ten that reaches `high` in 31 bits, and the round offset below `low` it counts from."""
+    """Return the smallest power of ten that reaches `high` in 31 bits, and the round offset that it counts from."""
     extent = max(high - low, np.finfo(float).eps * max(abs(low), abs(high)), 1e-12)
     unit = 10.0 ** np.ceil(np.log10(extent))
     offset = float(np.floor(low / unit) * unit)

@@ -143,8 +143,7 @@ def _unpack_colors(packed: np.ndarray, *, with_alpha: bool) -> dict[str, np.ndar
     bits = np.ascontiguousarray(packed).view(np.uint32)
     shifts = {"red": 16, "green": 8, "blue": 0, "alpha": 24}
     channels = {name: (bits >> shift & 255).astype(np.uint8) for name, shift in shifts.items()}
-    alpha = channels["alpha"]
-    if not with_alpha or not len(alpha) or ((alpha == alpha[0]).all() and alpha[0] in (0, 255)):
+    if not with_alpha or not _is_meaningful(channels["alpha"]):
         del channels["alpha"]
     return channels
 
@@ -197,9 +196,16 @@ def _pack_colors(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         return columns
     red, green, blue = (columns.pop(name).astype(np.uint32) for name in _COLORS)
     bits = red << 16 | green << 8 | blue
-    if "alpha" in columns and columns["alpha"].dtype == np.uint8:
-        return {**columns, "rgba": bits | columns.pop("alpha").astype(np.uint32) << 24}
+    alpha = columns.get("alpha")
+    # An alpha of 0 or 255 throughout would not be read back from rgba: it stays a field of its own.
+    if alpha is not None and alpha.dtype == np.uint8 and alpha.ndim == 1 and _is_meaningful(alpha):
+        del columns["alpha"]
+        return {**columns, "rgba": bits | alpha.astype(np.uint32) << 24}
     return {**columns, "rgb": bits.view(np.float32)}
+
+
+def _is_meaningful(alpha: np.ndarray) -> bool:
+    return len(alpha) > 0 and not (alpha[0] in (0, 255) and bool((alpha == alpha[0]).all()))
 
 
 def _code(path: object, name: str, values: np.ndarray) -> str:

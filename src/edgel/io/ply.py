@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from io import BytesIO, TextIOWrapper
 from itertools import islice
 from typing import BinaryIO
@@ -13,7 +14,7 @@ from edgel.cloud import Cloud
 from edgel.io.columns import find_xyz, fits_float32, flat_attributes, one_line
 from edgel.io.errors import FormatError
 from edgel.io.files import reading, replacing
-from edgel.io.ply_header import NAMES, Element, Header, read_header
+from edgel.io.ply_header import NAMES, Element, Header, range_grid, read_header
 from edgel.io.ply_lists import gather, walk_rows
 from edgel.io.rows import number_of, parse_text, read_binary, reject_row, remaining_bytes, write_binary
 
@@ -30,7 +31,8 @@ def read(path: str | os.PathLike[str] | BinaryIO) -> Cloud:
     -------
     Cloud
         All scalar vertex properties as (N,) attributes of their own type; list properties, faces and other elements are
-        left out. ``obj_info num_cols`` and ``num_rows`` make the cloud organized.
+        left out. ``obj_info num_cols`` and ``num_rows`` make the cloud organized; where Stanford's ``range_grid`` lists
+        only the valid points, the other cells are NaN.
 
     Raises
     ------
@@ -53,7 +55,7 @@ def read(path: str | os.PathLike[str] | BinaryIO) -> Cloud:
 
 def _read(path: str, file: BinaryIO) -> Cloud:
     header = read_header(path, file)
-    position = [element.name for element in header.elements].index("vertex")
+    position = header.index("vertex")
     vertex = header.elements[position]
     names = [p.name for p in vertex.properties if p.length_code is None]
     axes = find_xyz(names)
@@ -64,7 +66,11 @@ def _read(path: str, file: BinaryIO) -> Cloud:
     _check_size(path, header, vertex, file)
     read_body = _read_ascii if header.ascii else _read_binary
     xyz, attributes = read_body(path, file, header, header.elements[:position], vertex, axes)
-    return _to_cloud(path, header, xyz, attributes)
+    cloud = _to_cloud(path, header, xyz, attributes)
+    grid = range_grid(header)
+    if cloud.shape is None and grid is not None:
+        return _spread(path, cloud, *_read_grid(path, file, header, *grid))
+    return cloud
 
 
 def _check_size(path: str, header: Header, vertex: Element, file: BinaryIO) -> None:
@@ -100,7 +106,7 @@ def _read_ascii(
         table = parse_text(rows, dtype) if rows else np.empty(0, dtype)
     except ValueError as error:
         what = " ".join(p.name for p in scalars)
-        raise reject_row(path, what, rows, len(scalars), error, header.num_lines + num_skipped) from None
+        raise reject_row(path, what, rows, len(scalars), error, header.num_lines + num_skipped + 1) from None
     xyz = np.column_stack([table[name] for name in axes])
     return xyz, {p.name: np.ascontiguousarray(table[p.name]) for p in scalars if p.name not in axes}
 
@@ -175,11 +181,52 @@ def _read_with_lists(path: str, file: BinaryIO, header: Header, vertex: Element)
     }
 
 
+def _read_grid(
+    path: str, file: BinaryIO, header: Header, position: int, shape: tuple[int, int]
+) -> tuple[np.ndarray, tuple[int, int]]:
+    """Read which vertex each cell of a range grid holds (-1: none)."""
+    grid = header.elements[position]
+    if header.ascii:
+        file.seek(header.size)
+        lines = (line for line in file if not line.isspace())
+        first = sum(element.count for element in header.elements[:position])
+        cells = [line.split() for line in islice(lines, first, first + grid.count)]
+        good = len(cells) == grid.count
+        good = good and all(cell == [b"0"] or (cell[0] == b"1" and len(cell) == 2) for cell in cells)
+        if not good or not all(cell[-1].isdigit() for cell in cells):
+            raise FormatError(f"{path}: element range_grid is cut off, or a cell holds several points; get it again")
+        return np.array([int(cell[1]) if cell[0] == b"1" else -1 for cell in cells]), shape
+    for element in header.elements[header.index("vertex") + 1 : position]:
+        _skip(path, file, header, element)
+    data, offsets = _walk(path, file, header, grid, keep=True)
+    length = np.dtype(header.order + (grid.properties[0].length_code or ""))
+    filled = gather(data, offsets[:, 0], length) == 1
+    index = np.full(grid.count, -1, np.int64)
+    starts = offsets[filled, 0] + length.itemsize
+    index[filled] = gather(data, starts, np.dtype(header.order + grid.properties[0].code))
+    return index, shape
+
+
+def _spread(path: str, cloud: Cloud, index: np.ndarray, shape: tuple[int, int]) -> Cloud:
+    """Put the points of a range grid into their cells; the others become NaN (attributes that have no NaN: 0)."""
+    if len(index) and index.max() >= len(cloud):
+        raise FormatError(
+            f"{path}: range_grid names vertex {index.max()} of {len(cloud)}; the file is damaged: get it again"
+        )
+    filled = index >= 0
+    xyz = np.full((len(index), 3), np.nan)
+    xyz[filled] = cloud.xyz[index[filled]]
+    attributes = {}
+    for name, values in cloud.attributes.items():
+        attributes[name] = np.full(len(index), np.nan if values.dtype.kind == "f" else 0, values.dtype)
+        attributes[name][filled] = values[index[filled]]
+    return replace(cloud, xyz=xyz, attributes=attributes, shape=shape)
+
+
 def _to_cloud(path: str, header: Header, xyz: np.ndarray, attributes: dict[str, np.ndarray]) -> Cloud:
-    rows, cols = header.info.get("num_rows", ""), header.info.get("num_cols", "")
-    shape = (int(rows), int(cols)) if rows.isdecimal() and cols.isdecimal() else None
+    shape = header.shape
     if shape is not None and shape[0] * shape[1] != len(xyz):
-        shape = None  # Stanford's range grids list only the valid points of the grid
+        shape = None  # Stanford's range grids list only the valid points
     viewpoint = None
     if "viewpoint" in header.info:
         words = header.info["viewpoint"].split()
@@ -260,9 +307,11 @@ def _lossless_type(path: object, name: str, values: np.ndarray) -> str:
         if not len(values) or (int(values.min()) >= bounds.min and int(values.max()) <= bounds.max):
             return candidate
     # Doubles hold integers exactly up to 2^53; long doubles only where they are doubles.
-    as_double = values.astype(np.float64)
-    exact = np.abs(as_double) <= 2.0**53 if values.dtype.kind in "iu" else (as_double == values) | np.isnan(values)
-    if not exact.all():
+    if values.dtype.kind in "iu":
+        exact = max(-int(values.min()), int(values.max())) <= 2**53
+    else:
+        exact = np.array_equal(values.astype(np.float64), values, equal_nan=True)
+    if not exact:
         raise FormatError(
             f"{path}: attribute {name!r} ({values.dtype}) does not fit a PLY type exactly; write .npz instead"
         )

@@ -61,6 +61,17 @@ class Header:
     comments: list[str]
     info: dict[str, str]
     num_lines: int
+    size: int  # bytes
+
+    def index(self, name: str) -> int:
+        """Return the position of the first element of a name."""
+        return [element.name for element in self.elements].index(name)
+
+    @property
+    def shape(self) -> tuple[int, int] | None:
+        """Rows and columns that the obj_info lines give, None when they do not."""
+        rows, cols = self.info.get("num_rows", ""), self.info.get("num_cols", "")
+        return (int(rows), int(cols)) if rows.isdecimal() and cols.isdecimal() else None
 
 
 def read_header(path: str, file: BinaryIO) -> Header:
@@ -77,10 +88,21 @@ def read_header(path: str, file: BinaryIO) -> Header:
     bare_return = not head[: end.start()].count(b"\n")
     file.seek(end.end(1) - (bare_return and end.group(1) == b"\r\n"))
     lines = re.split(r"\r\n|\r|\n", head[: end.start()].decode("utf-8", "replace"))
-    return _parse_header(path, lines)
+    return _parse_header(path, lines, file.tell())
 
 
-def _parse_header(path: str, lines: list[str]) -> Header:
+def range_grid(header: Header) -> tuple[int, tuple[int, int]] | None:
+    """Return position and shape of Stanford's range_grid element behind the vertices, None when there is none."""
+    names = [element.name for element in header.elements]
+    if header.shape is None or "range_grid" not in names[names.index("vertex") :]:
+        return None
+    position = names.index("range_grid", names.index("vertex"))
+    grid = header.elements[position]
+    lists = [p.length_code is not None for p in grid.properties]
+    return (position, header.shape) if grid.count == header.shape[0] * header.shape[1] and lists == [True] else None
+
+
+def _parse_header(path: str, lines: list[str], size: int) -> Header:
     order = ""
     elements: list[Element] = []
     comments, info = [], {}
@@ -110,4 +132,4 @@ def _parse_header(path: str, lines: list[str]) -> Header:
         raise FormatError(
             f"{path}: the PLY file has no vertices (its elements: {found}); export the points as vertices"
         )
-    return Header(_BYTE_ORDER[order], order == "ascii", elements, comments, info, len(lines) + 1)
+    return Header(_BYTE_ORDER[order], order == "ascii", elements, comments, info, len(lines) + 1, size)
