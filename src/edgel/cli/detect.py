@@ -11,7 +11,7 @@ import typer
 
 import edgel
 from edgel.cli import files, options
-from edgel.cli.errors import ExitCode, Failure, exit_codes, failing_as
+from edgel.cli.errors import ExitCode, Failure, as_option, exit_codes, failing_as
 from edgel.cli.output import count, print_json, print_line, print_table, seconds
 from edgel.cli.progress import Watch
 from edgel.detect import PRESETS
@@ -93,7 +93,7 @@ def detect(
             stages = Stages(watch)
             with stages("reading"):
                 cloud = files.read_cloud(source, intrinsics)
-            with failing_as(ExitCode.DATA, source):
+            with failing_as(ExitCode.DATA, source, arguments(preset)):
                 edges = _FUNCTIONS[preset](cloud, **given, progress=watch)
             stages.seconds.update(edges.seconds)
             if output is not None:
@@ -102,16 +102,16 @@ def detect(
             if report is not None:
                 with stages("report"):
                     page = write_report(source, cloud, edges, report)
-        facts = collect(source, output, report, edges, stages.seconds)
         if as_json:
-            print_json(facts)
+            print_json(collect(source, output, report, edges, stages.seconds))
+            return
         print_table(f"Edges of {source}", summary(edges, stages.seconds))
         if output is not None:
             what = "the whole cloud, labelled" if label_all else "the edge points"
             print_line(f"{'stdout' if output == files.PIPE else output}: {what}")
         if page is not None:
             print_line(f"{page}: the report")
-        if output is None and report is None and not as_json:
+        if output is None and report is None:
             print_line("nothing was written; add -o edges.ply to write the edge points", style="dim")
 
 
@@ -119,15 +119,18 @@ def check_options(preset: str, given: dict[str, Any]) -> dict[str, Any]:
     """Return the options given if the preset has them, else raise a `Failure` that names those it has not."""
     if preset not in PRESETS:
         raise Failure(ExitCode.USAGE, f"--preset: {preset!r} is unknown; choose {' or '.join(PRESETS)}")
-    foreign = [name for name in given if name not in inspect.signature(_FUNCTIONS[preset]).parameters]
+    foreign = [name for name in given if name not in arguments(preset)]
     if foreign:
-        names = ", ".join(f"--{name.replace('_', '-')}" for name in foreign)
-        others = " or ".join(
-            other for other in PRESETS if set(foreign) <= set(inspect.signature(_FUNCTIONS[other]).parameters)
-        )
+        names = ", ".join(map(as_option, foreign))
+        others = " or ".join(other for other in PRESETS if set(foreign) <= arguments(other))
         remedy = f"add --preset {others}, or leave it out" if others else "leave it out"
         raise Failure(ExitCode.USAGE, f"{names}: not an option of the {preset} preset; {remedy}")
     return given
+
+
+def arguments(preset: str) -> set[str]:
+    """Return the names of the arguments that a preset has beside the points."""
+    return set(inspect.signature(_FUNCTIONS[preset]).parameters) - {"points"}
 
 
 def check_outputs(output: str | None, report: str | None, *, label_all: bool, as_json: bool) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from enum import IntEnum
 
@@ -42,14 +42,16 @@ class Failure(Exception):  # noqa: N818 - it is what a command ends with, bad in
 
 
 @contextmanager
-def failing_as(code: ExitCode, subject: str = "") -> Iterator[None]:
-    """Turn the errors that the library raises for bad input into a `Failure` with this code.
+def failing_as(code: ExitCode, subject: str, options: Collection[str] = ()) -> Iterator[None]:
+    """Turn the errors that the library raises for bad input into a `Failure`.
 
     Parameters
     ----------
     code : ExitCode
     subject : str
-        Put before messages that do not name a file themselves.
+        The file, put before messages that do not name it themselves.
+    options : collection of str
+        Arguments that come from the command line: what is wrong with them is wrong usage, whatever the code.
     """
     try:
         yield
@@ -59,7 +61,12 @@ def failing_as(code: ExitCode, subject: str = "") -> Iterator[None]:
         remedy = "thin the cloud or cut it into parts, or use a machine with more memory"
         raise Failure(code, _about(subject, f"not enough memory; {remedy}")) from error
     except (ValueError, TypeError, ImportError, OSError) as error:
-        raise Failure(code, _about(subject, describe_error(error))) from error
+        message = describe_error(error)
+        # The library's messages begin with the arguments that they are about.
+        names, colon, rest = message.partition(": ")
+        if colon and set(names.split(", ")) <= set(options):
+            raise Failure(ExitCode.USAGE, f"{', '.join(map(as_option, names.split(', ')))}: {rest}") from error
+        raise Failure(code, _about(subject, rest if names == "points" else message)) from error
 
 
 @contextmanager
@@ -96,6 +103,17 @@ def exit_codes(*, as_json: bool = False, debug: bool = False) -> Iterator[None]:
     if as_json:
         print_json({"error": message, "code": int(code)})
     raise typer.Exit(int(code))
+
+
+def as_option(name: str) -> str:
+    """Return the option that stands for an argument.
+
+    Examples
+    --------
+    >>> as_option("num_neighbors")
+    '--num-neighbors'
+    """
+    return "--" + name.replace("_", "-")
 
 
 def describe_error(error: BaseException) -> str:

@@ -29,7 +29,8 @@ def check_input(path: str, intrinsics: str | None = None) -> None:
         return
     with failing_as(ExitCode.INPUT, path):
         check_readable(path)
-        if intrinsics is not None:
+    if intrinsics is not None:
+        with failing_as(ExitCode.INPUT, intrinsics):
             check_readable(intrinsics)
 
 
@@ -37,7 +38,7 @@ def read_cloud(path: str, intrinsics: str | None = None) -> Cloud:
     """Read a cloud, PLY from stdin when the path is ``-``."""
     from edgel import io  # not at the top: `edgel --help` reads nothing
 
-    with failing_as(ExitCode.INPUT, "stdin" if path == PIPE else path):
+    with failing_as(ExitCode.INPUT, "stdin" if path == PIPE else path, ["intrinsics"]):
         return io.read(sys.stdin.buffer) if path == PIPE else io.read(path, intrinsics=intrinsics)
 
 
@@ -74,11 +75,13 @@ def check_folder(path: str, folder: Path) -> None:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        what = "is no folder" if folder.exists() and not folder.is_dir() else "cannot be written"
-        what = what if folder.exists() else "does not exist"
-        reason = f" ({error.strerror.lower()})" if error.strerror and what == "cannot be written" else ""
-        remedy = "make it first, or choose another" if what == "does not exist" else "choose another"
-        raise Failure(ExitCode.OUTPUT, f"{path}: the folder {folder} {what}{reason}; {remedy}") from error
+        if not folder.exists():
+            what = "does not exist; make it first, or choose another"
+        elif not folder.is_dir():
+            what = "is a file; choose another folder"
+        else:
+            what = f"cannot be written to ({(error.strerror or 'unknown reason').lower()}); choose another"
+        raise Failure(ExitCode.OUTPUT, f"{path}: {folder} {what}") from error
 
 
 def write_cloud(path: str, cloud: Cloud) -> None:

@@ -42,6 +42,7 @@ def normals(
 ) -> None:
     """Estimate the normal of every point of a cloud."""
     given = {"num_neighbors": num_neighbors, "viewpoint": viewpoint}
+    given = {name: value for name, value in given.items() if value is not None}
     with exit_codes(debug=debug):
         files.check_output(output)
         files.check_input(source, intrinsics)
@@ -49,8 +50,8 @@ def normals(
             stages = Stages(watch)
             with stages("reading"):
                 cloud = files.read_cloud(source, intrinsics)
-            with stages("normals"), failing_as(ExitCode.DATA, source):
-                planes = edgel.estimate_normals(cloud, **{k: v for k, v in given.items() if v is not None})
+            with stages("normals"), failing_as(ExitCode.DATA, source, given):
+                planes = edgel.estimate_normals(cloud, **given)
             with stages("writing"):
                 nx, ny, nz = planes.normals.astype(np.float32).T
                 variation = planes.variation.astype(np.float32)

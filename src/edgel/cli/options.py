@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 import edgel
+from edgel.cli.errors import as_option
 
 PAPER = "The published method (--preset paper)"
 
@@ -47,7 +48,7 @@ def option(function: Callable[..., Any], name: str, text: str, *, panel: str | N
     default = default_of(function, name)
     shown = "chosen from the data" if default is None else f"{default:g}"
     return typer.Option(
-        f"--{name.replace('_', '-')}",
+        as_option(name),
         help=text + default_note(shown),
         show_default=False,
         rich_help_panel=panel,
