@@ -365,10 +365,8 @@ def test_no_command_shows_help():
     assert run("--version").stdout.startswith("edgel 0.")
     for command in ("detect", "normals", "info", "convert"):
         page = run(command, "--help").stdout
-        assert (
-            "Examples:\n   edgel " in page.replace(" \n", "\n").replace("  ", " ").replace("  ", " ")
-            or "Examples:" in page
-        )
+        assert f"edgel {command}" in page
+        assert "Examples:" in page
         assert "Exit codes" in page
 
 
