@@ -16,8 +16,7 @@ EDGE_COLOR = (200, 0, 20)
 """Red of the edge points, dark against the light greys, so that it is told apart without seeing red."""
 ARROW_COLOR = (0, 60, 140)
 
-_GREYS = (105, 232)  # of the darkest and the lightest slope
-_PALE = (180, 244)  # the same where arrows shall stand out
+_PALE = (180, 244)  # greys of the darkest and the lightest slope where arrows shall stand out
 
 
 def render(
@@ -30,6 +29,7 @@ def render(
     margin: float = 0.03,
     normals: Any = None,
     point_radius: float | None = None,
+    greys: tuple[int, int] = (105, 232),
 ) -> np.ndarray:
     """Draw a cloud in grey, and some of its points in red on top of it (fig. 4 of the paper).
 
@@ -52,6 +52,8 @@ def render(
         Unit normals to shade by; by default the shape is taken from the picture's own depth.
     point_radius : float, optional
         Radius of a point, in pixels; by default chosen from the spacing, so that dense clouds have no holes.
+    greys : (int, int)
+        Grey of the darkest and of the lightest slope, 0 to 255.
 
     Returns
     -------
@@ -71,7 +73,7 @@ def render(
     (300, 400, 3)
     """
     scene = Scene(points, direction=direction, size=size, crop=crop, margin=margin, point_radius=point_radius)
-    picture = _greys(scene, scene.shaded_by_slope() if normals is None else scene.shaded_by_normal(normals), _GREYS)
+    picture = _greys(scene, scene.shaded_by_slope() if normals is None else scene.shaded_by_normal(normals), greys)
     if rows_on_top is not None:
         picture[scene.on_top(check_rows(rows_on_top, scene.num_input))] = EDGE_COLOR
     return _reduced(Image.fromarray(picture))
