@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -53,6 +53,7 @@ class _Panel:
 
     image: np.ndarray
     title: str = ""
+    raster: bool = False  # its own pixels are what is shown, at any size
     extent: tuple[float, float, float, float] | None = None
 
     @property
@@ -151,12 +152,12 @@ def _figure_1(cloud: Cloud, edges: Edges, name: str, part: Part | None) -> _Cont
         panels.append(_Panel(plot.render(cloud, direction=direction, size=size, crop=True), "the cloud"))
         words.append("the point cloud")
     if isinstance(edges, PaperEdges):
-        panels.append(_Panel(_projection(edges), "its projection"))
+        panels.append(_Panel(_projection(edges), "its projection", raster=True))
         words.append("its projection on the x, y plane, the lighter the higher, black where no point falls")
     if len(panels) == 1:
-        return _Content(1, f"Figure 1. {name}: {words[0]}.", [_Panel(panels[0].image)])
+        return _Content(1, f"Figure 1. {name}: {words[0]}.", [replace(panels[0], title="")])
     letters = [f"({letter}) " for letter in "abc"]
-    titled = [_Panel(panel.image, letter + panel.title) for letter, panel in zip(letters, panels, strict=False)]
+    titled = [replace(panel, title=letter + panel.title) for letter, panel in zip(letters, panels, strict=False)]
     caption = "; ".join(letter + word for letter, word in zip(letters, words, strict=False))
     return _Content(1, f"Figure 1. {name}: {caption}.", titled)
 
@@ -174,12 +175,10 @@ def _figure_3(edges: PaperEdges, name: str, part: Part | None) -> _Content:
     extent = (float(grid.lower[0]), float(grid.upper[0]), float(grid.lower[1]), float(grid.upper[1]))
     edge_map = np.where(edges.edge_map, 0, 255).astype(np.uint8)[::-1, :, None].repeat(3, axis=2)
     panels = [
-        _Panel(_projection(edges), f"(a) projection, {grid.width} x {grid.height} pixels", extent),
-        _Panel(edge_map, f"(b) edge map, {np.count_nonzero(edges.edge_map):,} edge pixels", extent),
+        _Panel(_projection(edges), f"(a) projection, {grid.width} x {grid.height} pixels", True, extent),
+        _Panel(edge_map, f"(b) edge map, {np.count_nonzero(edges.edge_map):,} edge pixels", True, extent),
     ]
-    caption = (
-        f"Figure 3. {name}: (a) the projection in grey; (b) the edge pixels that Canny's method finds in it, black."
-    )
+    caption = f"Figure 3. {name}: (a) the projection; (b) the edge pixels that Canny's method finds in it, in black."
     return _Content(3, caption, panels, unit="" if part is None else "mm")
 
 
@@ -223,7 +222,7 @@ def _compose(content: _Content, *, caption: bool) -> bytes:
     gaps = (len(panels) - 1) * (_GAP + axes_strip)
     aspects = sum(panel.aspect for panel in panels)
     # A picture is shown pixel for pixel where there is room: scaled up or a little down it would blur.
-    natural = [panel.image.shape[0] for panel in panels if panel.extent is None]
+    natural = [panel.image.shape[0] for panel in panels if not panel.raster]
     height = round(min((_WIDTH - 2 * _GAP - axes_strip - gaps) / aspects, *(natural or [_TALLEST]), _TALLEST))
     lines = textwrap.wrap(content.caption, 120) if caption else []
     above = _TITLE if any(panel.title for panel in panels) else _GAP // 2
@@ -250,7 +249,7 @@ def _show(axes: Axes, panel: _Panel, unit: str) -> None:
     if panel.title:
         axes.set_title(panel.title, fontsize=11, pad=6)
     if panel.extent is None:
-        axes.imshow(panel.image, interpolation="antialiased", aspect="auto")
+        axes.imshow(panel.image, interpolation="nearest" if panel.raster else "antialiased", aspect="auto")
         axes.set_axis_off()
         return
     left, right, bottom, top = panel.extent

@@ -127,7 +127,7 @@ def arrows(
     known = np.flatnonzero(np.isfinite(normals).all(axis=1))
     chosen, starts = scene.spread(rows[known], spacing * unit)
     along = normals[known[chosen]] @ np.column_stack([scene.camera.right, -scene.camera.up])
-    _draw_arrows(ImageDraw.Draw(image), starts, starts + along * length * unit, max(1.4 * FINE, unit / 450))
+    _draw_arrows(ImageDraw.Draw(image), starts, starts + along * length * unit, max(1.4 * FINE, unit / 360))
     return _reduced(image)
 
 

@@ -1,0 +1,99 @@
+"""The page of a report as HTML: no link leads out of it, and it reads on paper and in the dark."""
+
+from __future__ import annotations
+
+import base64
+import html
+from collections.abc import Sequence
+
+from edgel.figures import FigureImage
+from edgel.tables import Table, machine_table
+
+
+def section(name: str, figures: Sequence[FigureImage], tables: Sequence[Table]) -> str:
+    """Set the figures and tables of one cloud under its name."""
+    images, own = "".join(map(_figure, figures)), "".join(map(_table, tables))
+    return f'<section><h2>{html.escape(name)}</h2>{images}<div class="tables">{own}</div></section>'
+
+
+def opening(title: str, findings: Sequence[str], tables: Sequence[Table]) -> str:
+    """Set what comes first: the heading, the findings, and the tables of all clouds together."""
+    items = "".join(f"<li>{html.escape(finding)}</li>" for finding in findings)
+    listed = f'<ul class="findings">{items}</ul>' if items else ""
+    return f"<h1>{html.escape(title)}</h1>{listed}{''.join(map(_table, tables))}"
+
+
+def _figure(figure: FigureImage) -> str:
+    data = base64.b64encode(figure.png_bare).decode()
+    caption = html.escape(figure.caption)
+    alt = html.escape(figure.caption, quote=True)
+    return f'<figure><img src="data:image/png;base64,{data}" alt="{alt}"><figcaption>{caption}</figcaption></figure>'
+
+
+def _table(table: Table) -> str:
+    numeric = {
+        name
+        for name in table.columns
+        if any(isinstance(row[name], int | float) for row in table.rows)
+        and not any(isinstance(row[name], str) for row in table.rows)
+    }
+    head = "".join(f"<th{_align(name, numeric)}>{html.escape(name)}</th>" for name in table.columns)
+    body = "".join(
+        "<tr>"
+        + "".join(f"<td{_align(name, numeric)}>{html.escape(value)}</td>" for name, value in row.items())
+        + "</tr>"
+        for row in table.text()
+    )
+    note = f'<p class="note">{html.escape(table.note)}</p>' if table.note else ""
+    grid = f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+    return f'<div class="table"><h3>{html.escape(table.title)}</h3>{grid}{note}</div>'
+
+
+def _align(name: str, numeric: set[str]) -> str:
+    return ' class="number"' if name in numeric else ""
+
+
+def page(title: str, parts: Sequence[str]) -> str:
+    """Put the parts of a page together, and the table of the machine below them."""
+    return (
+        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        '<meta name="color-scheme" content="light dark">'
+        f"<title>{html.escape(title)}</title><style>{_STYLE}</style></head>\n"
+        f"<body><main>{''.join(parts)}\n{_table(machine_table())}</main></body></html>\n"
+    )
+
+
+_STYLE = """
+:root { --ink: #1c1c1c; --soft: #5c5c5c; --rule: #d5d5d5; --paper: #ffffff; --tint: #f4f4f2; }
+@media (prefers-color-scheme: dark) {
+  :root { --ink: #e8e8e6; --soft: #a9a9a6; --rule: #45454a; --paper: #17171a; --tint: #222226; }
+}
+body { margin: 0; background: var(--paper); color: var(--ink); font: 16px/1.5 system-ui, sans-serif; }
+main { max-width: 66rem; margin: 0 auto; padding: 1.5rem 1.25rem 4rem; }
+h1 { font-size: 1.7rem; line-height: 1.25; }
+h2 { font-size: 1.35rem; margin-top: 3rem; padding-top: 1rem; border-top: 1px solid var(--rule); }
+h3 { font-size: 1rem; margin: 1.5rem 0 .4rem; }
+.findings { background: var(--tint); padding: .8rem 1rem .8rem 2.2rem; border-radius: 6px; }
+.findings li { margin: .35rem 0; }
+figure { margin: 1.5rem 0; }
+/* The figures are drawn on white; in the dark they keep their sheet of paper. */
+figure img { display: block; width: 100%; height: auto; background: #ffffff; border-radius: 6px; }
+figcaption { color: var(--soft); font-size: .92rem; margin-top: .5rem; }
+.tables { display: flex; flex-wrap: wrap; gap: 0 3rem; align-items: flex-start; }
+.table { max-width: 100%; }
+.scroll { overflow-x: auto; }
+table { border-collapse: collapse; font-size: .92rem; font-variant-numeric: tabular-nums; }
+th, td { text-align: left; padding: .25rem .9rem .25rem 0; border-bottom: 1px solid var(--rule); }
+td { vertical-align: top; }
+th { vertical-align: bottom; color: var(--soft); font-weight: 600; }
+.number { text-align: right; }
+.note { color: var(--soft); font-size: .88rem; max-width: 44rem; margin: .4rem 0 0; }
+@media print {
+  :root { --ink: #000000; --soft: #444444; --rule: #bbbbbb; --paper: #ffffff; --tint: #f4f4f2; }
+  body { font-size: 11pt; }
+  main { max-width: none; padding: 0; }
+  figure, .table { break-inside: avoid; }
+  h2, h3 { break-after: avoid; }
+}
+"""
