@@ -139,6 +139,20 @@ def test_detect_json(scan, tmp_path):
     assert {"input", "report", "preset", "normals_undefined", "peak_memory_bytes"} < set(found)
 
 
+def test_detect_report(scan, tmp_path):
+    result = run("detect", scan, "--report", tmp_path / "new" / "report", "--json", *PAPER)
+    page = tmp_path / "new" / "report" / "report.html"
+    assert json.loads(result.stdout)["report"] == str(page)
+    assert "scan" in page.read_text()
+    assert f"{page}: the report" in run("detect", scan, "--report", page.parent, *PAPER).stderr
+    assert run("detect", scan, "--report", scan).exit_code == 5
+    assert run("detect", scan, "--report", "/proc/report").exit_code == 5
+
+
+def test_a_cloud_that_is_all_edges_is_remarked(scan):
+    assert "too sparse" in run("detect", scan, *PAPER).stderr
+
+
 def test_every_argument_of_the_detectors_is_an_option_and_its_default_is_shown():
     names = set(inspect.signature(detect).parameters)
     assert (arguments("default") | arguments("paper")) - {"progress"} <= names

@@ -33,6 +33,8 @@ Examples:
   cat scan.ply | edgel detect - -o - > edges.ply
 """
 
+_SUSPICIOUS_SHARE = 0.5  # of edge points: published surfaces have 2 to 15 %
+
 _FUNCTIONS = {"default": edgel.detect, "paper": edgel.paper.detect}
 
 
@@ -101,11 +103,15 @@ def detect(
                     files.write_cloud(output, edges.label(cloud) if label_all else edges.cloud(cloud))
             if report is not None:
                 with stages("report"):
-                    page = write_report(source, cloud, edges, report)
+                    page = report_on(source, cloud, edges, report)
         if as_json:
-            print_json(collect(source, output, report, edges, stages.seconds))
+            print_json(collect(source, output, page, edges, stages.seconds))
             return
         print_table(f"Edges of {source}", summary(edges, stages.seconds))
+        if edges.share > _SUSPICIOUS_SHARE:
+            print_line(
+                "more than half of the points are edges: the cloud may be too sparse for this method", style="yellow"
+            )
         if output is not None:
             what = "the whole cloud, labelled" if label_all else "the edge points"
             print_line(f"{'stdout' if output == files.PIPE else output}: {what}")
@@ -142,13 +148,16 @@ def check_outputs(output: str | None, report: str | None, *, label_all: bool, as
     if output is not None:
         files.check_output(output)
     if report is not None:
-        folder = Path(report)
-        files.check_folder(report, next(parent for parent in (folder, *folder.parents) if parent.exists()))
+        files.check_new_folder(report)
 
 
-def write_report(source: str, cloud: edgel.Cloud, edges: Edges, directory: str) -> Path:
+def report_on(source: str, cloud: edgel.Cloud, edges: Edges, directory: str) -> Path:
     """Write the report of one cloud and return its page."""
-    raise NotImplementedError
+    from edgel.report import Case, write_report  # not at the top: Matplotlib takes time to import
+
+    name = "stdin" if source == files.PIPE else Path(source).stem
+    with failing_as(ExitCode.OUTPUT, directory):
+        return write_report([Case(name, cloud, edges)], directory, title=f"Edges of {name}")
 
 
 def kinds(edges: Edges) -> dict[str, int]:
@@ -158,13 +167,13 @@ def kinds(edges: Edges) -> dict[str, int]:
 
 
 def collect(
-    source: str, output: str | None, report: str | None, edges: Edges, by_stage: dict[str, float]
+    source: str, output: str | None, page: Path | None, edges: Edges, by_stage: dict[str, float]
 ) -> dict[str, Any]:
     """Return what ``--json`` prints."""
     return {
         "input": source,
         "output": output,
-        "report": report,
+        "report": None if page is None else str(page),
         "preset": edges.preset,
         "points": edges.num_points,
         "not_finite": edges.num_dropped,

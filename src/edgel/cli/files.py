@@ -84,6 +84,12 @@ def check_folder(path: str, folder: Path) -> None:
         raise Failure(ExitCode.OUTPUT, f"{path}: {folder} {what}") from error
 
 
+def check_new_folder(path: str) -> None:
+    """Raise a `Failure` for a folder that is not there and cannot be made, or cannot be written."""
+    folder = Path(path)
+    check_folder(path, next(parent for parent in (folder, *folder.parents) if parent.exists()))
+
+
 def write_cloud(path: str, cloud: Cloud) -> None:
     """Write a cloud, PLY to stdout when the path is ``-``."""
     from edgel import io
