@@ -268,7 +268,7 @@ def test_pipes(scan):
 
 
 def test_a_pipe_that_closes_early_is_told_without_a_traceback(tmp_path):
-    io.write(tmp_path / "a.npy", edgel.Cloud(np.random.default_rng(0).random((30_000, 3))))
+    io.write(tmp_path / "a.npy", edgel.Cloud(np.random.default_rng(0).random((500_000, 3))))
     command = [sys.executable, "-c", "from edgel.cli import app; app()", "convert", "a.npy", "-"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=tmp_path) as process:
         assert process.stdout is not None
