@@ -57,7 +57,9 @@ def code_1_seconds(points: np.ndarray, found: paper.PaperEdges, pixels: int = 25
 def main() -> None:
     with np.printoptions(precision=4, suppress=True):
         for name, size, sigma in (("8", 3, 1.4), ("9", 5, 1.4), ("10", 3, 2.0), ("11", 5, 2.0)):
-            print(f"eq. {name}: {size} x {size}, sigma {sigma}: eq. 7 as it stands, sum {plain_gaussian(size, sigma).sum():.4f}")
+            print(
+                f"eq. {name}: {size} x {size}, sigma {sigma}: eq. 7 as it stands, sum {plain_gaussian(size, sigma).sum():.4f}"
+            )
             print(plain_gaussian(size, sigma))
             print("normalised\n", gaussian_kernel(size, sigma), sep="")
     print(f"sum of eq. 9 as printed: {EQ_9.sum():.4f}")

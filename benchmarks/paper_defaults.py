@@ -33,15 +33,32 @@ def measure(scan: synth.Scan, spacings: float, high: float, tolerance: float) ->
     return f"{100 * found.share:5.1f} | {100 * stray.mean():4.1f} | {100 * reached.mean():4.0f}"
 
 
+def density(scan: synth.Scan, kept: float) -> str:
+    """Share of edge points when only some of the points are kept: tolerance in pixels, and as it is by default."""
+    points = scan.cloud.xyz[np.random.default_rng(0).random(len(scan.cloud)) < kept]
+    default = paper.detect(points)
+    pixels = paper.detect(points, tolerance=4 * max(default.grid.pixel))
+    return f"{len(points):,} | {100 * pixels.share:.1f} | {100 * default.share:.1f}"
+
+
 def main() -> None:
     scans = [synth.scan(synth.tee()), synth.scan(synth.elbow())]
-    head = "| tee: share % | stray pixels % | outline within 1 mm % | elbow: share % | stray % | outline % |\n" + "|---" * 7 + "|"
+    head = (
+        "| tee: share % | stray pixels % | outline within 1 mm % | elbow: share % | stray % | outline % |\n"
+        + "|---" * 7
+        + "|"
+    )
     print("high, at pixels of 4 spacings and a tolerance of 4 pixels; low = 0.4 high\n\n| high", head)
     for high in (10, 15, 20, 25, 30, 35, 40, 50, 100, 200):
         print(f"| {high} |", " | ".join(measure(scan, 4.0, high, 4.0) for scan in scans), "|")
     print("\npixel (spacings) and tolerance (pixels), at high = 40\n\n| pixel, tolerance", head)
     for spacings, tolerance in product((1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 8.0), (0.707, 1.0, 2.0, 4.0, 8.0)):
-        print(f"| {spacings}, {tolerance} |", " | ".join(measure(scan, spacings, 40.0, tolerance) for scan in scans), "|")
+        print(
+            f"| {spacings}, {tolerance} |", " | ".join(measure(scan, spacings, 40.0, tolerance) for scan in scans), "|"
+        )
+    print("\nthinner scans\n\n| part | points | share %, 4 pixels | share %, default |\n|---|---|---|---|")
+    for scan, kept in product(scans, (1.0, 0.25, 0.0625)):
+        print(f"| {scan.part.name} | {density(scan, kept)} |")
 
 
 if __name__ == "__main__":

@@ -100,6 +100,12 @@ def test_one_set_of_defaults_gives_about_ten_percent_of_both_parts(scan):
     assert np.mean(reached < 1.0) > 0.97
 
 
+@pytest.mark.parametrize("share", [0.25, 0.0625])
+def test_the_share_does_not_depend_on_the_density(scan, share):
+    kept = np.random.default_rng(0).random(len(scan.cloud)) < share
+    assert 0.08 <= paper.detect(scan.cloud.xyz[kept]).share <= 0.12
+
+
 def test_normals_of_the_edges_are_those_of_the_surface(scan):
     found = paper.detect(scan.cloud)
     everywhere = by_offset(edgel.estimate_normals(scan.cloud))

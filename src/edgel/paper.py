@@ -22,7 +22,7 @@ from edgel.project import PixelGrid, back_project, grey_image, occupied_spacing,
 from edgel.stages import Stages
 
 PIXEL_SPACINGS = 4.0  # default pixel, in point spacings: coarse enough for no holes, which would all be edges
-TOLERANCE_PIXELS = 4.0  # default tolerance, in pixels: with it both of the paper's parts give about 10 %
+TOLERANCE_SHARE = 0.018  # default tolerance, of the image's size: both of the paper's parts give about 10 %
 _STEP_RESPONSE = 4.0 * 255.0  # the Sobel magnitude of the largest step of grey, which is strength 1
 _MAX_PIXELS = 2**28
 
@@ -75,7 +75,9 @@ def detect(
     low, high : float
         Thresholds on the gradient of the smoothed grey, in Sobel units: a step of g grey levels gives about 2.3 g.
     tolerance : float, optional
-        Half the side t of the window around each edge pixel, in the cloud's unit. Default: 4 pixels.
+        Half the side t of the window around each edge pixel, in the cloud's unit. Default:
+        1.8 % of the root of the image's area, and at least a pixel; so the share of edge points, about 10 % on the paper's
+        parts, does not depend on how densely they were scanned.
     gray_min : float
         Grey of the lowest point, 0 to 255 (eq. 5); 0 is where no point falls.
     num_neighbors : int
@@ -176,7 +178,8 @@ def choose_grid(xyz: np.ndarray, width: int | None, height: int | None) -> Pixel
 def choose_tolerance(tolerance: float | None, grid: PixelGrid) -> float:
     """Return half the side of the back-projection's window, in the cloud's unit."""
     if tolerance is None:
-        return TOLERANCE_PIXELS * max(grid.pixel)
+        extent = grid.upper - grid.lower
+        return float(max(*grid.pixel, TOLERANCE_SHARE * np.sqrt(extent[0] * extent[1])))
     if not 0 < tolerance < np.inf:
         raise ValueError(f"tolerance: expected a length above 0, in the cloud's unit, got {tolerance}")
     return float(tolerance)
