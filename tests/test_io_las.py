@@ -33,7 +33,8 @@ def test_read_take_write_keeps_everything(airborne, tmp_path, name, suffix):
     assert_same(found, part)
     assert list(found.attributes) == list(part.attributes)
     assert found.crs == cloud.crs
-    header = laspy.open(tmp_path / f"a{suffix}").header
+    with laspy.open(tmp_path / f"a{suffix}") as reader:
+        header = reader.header
     assert header.are_points_compressed == (suffix == ".laz")
     assert (header.version, header.point_format.id) == (theirs.header.version, theirs.header.point_format.id)
     np.testing.assert_array_equal(header.scales, theirs.header.scales)
@@ -58,9 +59,10 @@ def test_extra_dimensions_are_kept_as_declared(tmp_path, suffix):
     write(tmp_path / f"b{suffix}", cloud)
     found = read(tmp_path / f"b{suffix}")
     assert_same(found, cloud, names={name: name for name in cloud.attributes})
-    kept = {extra.name: extra for extra in laspy.open(tmp_path / f"b{suffix}").header.point_format.extra_dimensions}
+    with laspy.open(tmp_path / f"b{suffix}") as reader:
+        kept = {extra.name: extra for extra in reader.header.point_format.extra_dimensions}
     assert list(kept) == ["height", "normal", "two words"]
-    assert kept["height"].scales.tolist() == [0.01]
+    assert kept["height"].scales == np.array([0.01])
     assert kept["height"].description == "above ground"
     assert kept["normal"].num_elements == 3
 
@@ -161,6 +163,16 @@ def test_promise_of_too_many_points_is_not_believed(airborne, tmp_path, name):
     (tmp_path / name).write_bytes(raw)
     with pytest.raises(FormatError, match=r"declared 4294967295 points, found|reading LAS failed"):
         read(tmp_path / name)
+
+
+@pytest.mark.parametrize("position", [100, 243])
+def test_promise_of_too_many_records_is_not_believed(tmp_path, position):
+    write(tmp_path / "a.las", Cloud(np.eye(3)))
+    raw = bytearray((tmp_path / "a.las").read_bytes())
+    struct.pack_into("<I", raw, position, 2**32 - 1)
+    (tmp_path / "a.las").write_bytes(raw)
+    with pytest.raises(FormatError, match="declared 4294967295 header records"):
+        read(tmp_path / "a.las")
 
 
 def test_truncated(airborne, tmp_path):

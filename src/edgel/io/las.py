@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,6 +17,9 @@ from edgel.io.columns import flat_attributes
 from edgel.io.errors import FormatError
 from edgel.io.files import reading, replacing, wrong_magic
 from edgel.io.las_crs import crs_of, set_crs
+
+# laspy logs an error before it raises it, which Python prints when nobody listens; the exception says the same.
+logging.getLogger("laspy").addHandler(logging.NullHandler())
 
 # Points decoded at a time: a header that promises too many costs no more than this.
 _CHUNK = 1_000_000
@@ -77,6 +81,7 @@ def read(path: str | os.PathLike[str]) -> Cloud:
         head = file.read(512)
         if not head.startswith(b"LASF"):
             wrong_magic(name, "a LAS or LAZ file", head)
+        _check_records(name, head, size)
         file.seek(0)
         with _foreign_errors(name, "reading LAS"), laspy.open(file, closefd=False) as reader:
             header = reader.header
@@ -87,8 +92,22 @@ def read(path: str | os.PathLike[str]) -> Cloud:
             raise FormatError(
                 f"{name}: the scales {scales} or offsets {offsets} of the header are not finite; get the file again"
             )
-        axes = [columns.pop(axis) * scales[i] + offsets[i] for i, axis in enumerate("XYZ")]
-    return Cloud(np.column_stack(axes), columns, crs=crs_of(header), metadata={"las_header": header})
+        with np.errstate(over="ignore", invalid="ignore"):
+            xyz = np.column_stack([columns.pop(axis) * scales[i] + offsets[i] for i, axis in enumerate("XYZ")])
+        if not np.isfinite(xyz).all():
+            raise FormatError(
+                f"{name}: scales {scales} make coordinates infinite; the header is damaged: get the file again"
+            )
+    return Cloud(xyz, columns, crs=crs_of(header), metadata={"las_header": header})
+
+
+def _check_records(path: str, head: bytes, size: int) -> None:
+    """Compare the promised records with the file's size: laspy would read billions of empty ones."""
+    records = [(100, 54)] + ([(243, 60)] if head[24:26] == b"\x01\x04" else [])
+    for position, length in records:
+        count = int.from_bytes(head[position : position + 4], "little")
+        if count * length > size:
+            raise FormatError(f"{path}: declared {count} header records, the file has {size} bytes; get the file again")
 
 
 def _check_size(path: str, header: laspy.LasHeader, size: int) -> None:
@@ -158,7 +177,7 @@ def write(path: str | os.PathLike[str], cloud: Cloud) -> None:
     attributes = flat_attributes(cloud, name, keep_arrays=True)
     header = _header_for(cloud, attributes)
     values = _fit_dimensions(name, header, attributes)
-    scales, offsets = _grid(cloud.xyz, header)
+    scales, offsets = _grid(cloud.xyz, header, new="las_header" not in cloud.metadata)
     header.scales, header.offsets = scales, offsets
     with _foreign_errors(name, "encoding LAS"):
         record = laspy.ScaleAwarePointRecord.zeros(len(cloud), header=header)
@@ -268,15 +287,18 @@ def _fits(dimension: laspy.DimensionInfo, column: np.ndarray) -> bool:
     return bool(whole and low >= dimension.min and high <= dimension.max)
 
 
-def _grid(xyz: np.ndarray, header: laspy.LasHeader) -> tuple[np.ndarray, np.ndarray]:
+def _grid(xyz: np.ndarray, header: laspy.LasHeader, *, new: bool) -> tuple[np.ndarray, np.ndarray]:
     """Return scales and offsets (3,): the header's where all points lie on its grid, else the finest that fits."""
     scales, offsets = np.array(header.scales, float), np.array(header.offsets, float)
     for axis in range(3):
         column = xyz[:, axis]
         if not len(column):
             continue
+        if new:
+            scales[axis], offsets[axis] = _finest(float(column.min()), float(column.max()))
+            continue
         steps = (column - offsets[axis]) / scales[axis]
-        tolerance = 1e-4 + np.finfo(float).eps * 8 * np.abs(column).max() / scales[axis]
+        tolerance = 1e-9 + np.finfo(float).eps * 8 * np.abs(column).max() / scales[axis]
         if np.abs(steps).max() <= _MAX_INT32 and tolerance < 0.5 and np.abs(steps - np.rint(steps)).max() <= tolerance:
             continue
         scales[axis], offsets[axis] = _finest(float(column.min()), float(column.max()))

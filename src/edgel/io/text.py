@@ -88,7 +88,9 @@ def read(path: str | os.PathLike[str]) -> Cloud:
 def _decode(path: str, raw: bytes) -> list[str]:
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
         text = raw.decode("utf-16", "replace")
-    elif b"\0" in raw[:4096] or describe(raw[:512])[1].startswith(("name it .p", "name it .l", "name it .e", "unpack")):
+    elif b"\0" in raw[:4096] or describe(raw[:512])[1].startswith(
+        ("name it .p", "name it .l", "name it .e", "name it .n", "unpack")
+    ):
         what, remedy = describe(raw[:512])
         raise FormatError(f"{path}: not a text of points; the file seems to be {what}: {remedy}")
     else:
@@ -124,6 +126,8 @@ def _find_layout(path: str, lines: list[str]) -> _Layout:
                 continue
             return _Layout(number, delimiter, comma, _header_names(path, header, len(tokens), number), count)
         if (header is not None and not header[1]) or not _is_header(tokens):
+            if header is not None and not header[1] and find_xyz(_split(header[0], _separator(header[0])[0])) is None:
+                number, line = header_number - 1, header[0]  # words, not a header
             expected = "numbers or a header with x, y and z"
             raise FormatError(
                 f"{path}: line {number + 1}: expected {expected}, found {line.strip()[:60]!r}; mend the file"
