@@ -75,7 +75,7 @@ def test_several_scans_with_poses(tmp_path):
     points = np.random.default_rng(0).normal(size=(5, 3))
     with pye57.E57(file, mode="w") as e57:
         for number in (1, 2):
-            data = {f"cartesian{axis}": points[:, i].copy() for i, axis in enumerate("XYZ")}
+            data: dict[str, np.ndarray] = {f"cartesian{axis}": points[:, i].copy() for i, axis in enumerate("XYZ")}
             if number == 2:
                 data["intensity"] = np.linspace(0, 1, 5).astype(np.float32)
             # A quarter turn about z, then a shift.

@@ -210,7 +210,7 @@ def test_depth_images_without_or_with_wrong_camera(tmp_path):
     with pytest.raises(FormatError, match="depth image needs its camera"):
         read(tmp_path / "wide.npy")
     write(tmp_path / "a.ply", Cloud(np.eye(3)))
-    with pytest.raises(ValueError, match="intrinsics: .* is no depth image"):
+    with pytest.raises(ValueError, match=r"intrinsics: .* is no depth image"):
         read(tmp_path / "a.ply", intrinsics=CAMERA)
     with pytest.raises(ValueError, match="fx: expected a number above 0"):
         Intrinsics(0, 1, 1, 1)

@@ -236,13 +236,14 @@ def test_pypcd4_reads_ours_and_we_read_its(tmp_path, shared_data):
     np.testing.assert_array_equal(theirs.numpy(("x", "y", "z")), cloud.xyz)
     for code in ("u1", "i8", "f4", "f8"):
         np.testing.assert_array_equal(theirs.numpy((f"a_{code}",))[:, 0], cloud.attributes[f"a_{code}"])
-    for encoding in pypcd4.Encoding:
+    for encoding in (pypcd4.Encoding.ASCII, pypcd4.Encoding.BINARY, pypcd4.Encoding.BINARY_COMPRESSED):
         theirs.save(tmp_path / "b.pcd", encoding=encoding)
         found = read(tmp_path / "b.pcd")
-        # Its text has ten digits.
+        # Its text has ten digits, which makes packed colours 0.
         digits = 1e-9 if encoding == pypcd4.Encoding.ASCII else 0
         np.testing.assert_allclose(found.xyz, cloud.xyz, rtol=digits)
-        for name in ("red", "green", "blue", "a_i2", "a_f8"):
+        colors = () if encoding == pypcd4.Encoding.ASCII else ("red", "green", "blue")
+        for name in (*colors, "a_i2", "a_f8"):
             np.testing.assert_allclose(found.attributes[name], cloud.attributes[name], rtol=digits)
     for file in shared_data.glob("kinect_*/*.pcd"):
         table = pypcd4.PointCloud.from_path(file)

@@ -15,9 +15,8 @@ from edgel.io.e57_write import CARTESIAN, GRID, NAMES, PREFIX, SPHERICAL, librar
 from edgel.io.errors import FormatError
 from edgel.io.files import reading, wrong_magic
 
-# What the smallest integer type that holds a field's bounds is looked for among.
-# long long, since pye57 takes NumPy's int64 (a C long) for 32 bits.
-_INTEGERS = [np.dtype(code) for code in ("u1", "i1", "u2", "i2", "u4", "i4", "longlong")]
+# The smallest of these that holds a field's bounds is its type.
+_INTEGERS = [np.dtype(code) for code in ("u1", "i1", "u2", "i2", "u4", "i4", "i8")]
 
 
 @dataclass(frozen=True)
@@ -105,7 +104,7 @@ def _read_scan(path: str, lib: ModuleType, image: Any, node: Any, size: int) -> 
         raise FormatError(
             f"{path}: a scan declares {count} points, the file has {size} bytes; it is damaged: get it again"
         )
-    columns = {name: np.zeros(count, dtype) for name, (dtype, _) in types.items()}
+    columns = {name: np.zeros(count, _buffer_type(dtype)) for name, (dtype, _) in types.items()}
     if count:
         buffers = lib.VectorSourceDestBuffer()
         for name, column in columns.items():
@@ -117,7 +116,13 @@ def _read_scan(path: str, lib: ModuleType, image: Any, node: Any, size: int) -> 
             raise FormatError(
                 f"{path}: a scan declares {count} points, found {found}; the file is damaged: get it again"
             )
-    return _place(path, node, columns)
+    exact = {name: column.astype(types[name][0], copy=False) for name, column in columns.items()}
+    return _place(path, node, exact)
+
+
+def _buffer_type(dtype: np.dtype) -> np.dtype:
+    # pye57 refuses NumPy's int32 (a C int) and takes its int64 (a C long) for 32 bits; long long is right everywhere.
+    return np.dtype(np.longlong) if dtype.kind in "iu" and dtype.itemsize > 2 else dtype
 
 
 def _field_type(lib: ModuleType, node: Any) -> tuple[np.dtype | None, int]:
@@ -155,7 +160,6 @@ def _place(path: str, node: Any, columns: dict[str, np.ndarray]) -> _Scan:
         xyz = xyz @ rotation.T + position
     prefix = PREFIX + ":"
     named = {NAMES.get(n, n).removeprefix(prefix): c for n, c in columns.items()}
-    named = {n: c.astype(np.int64) if c.dtype == np.longlong else c for n, c in named.items()}
     return _Scan(xyz, named, invalid, position)
 
 

@@ -148,6 +148,7 @@ def _field_node(lib: ModuleType, image: Any, values: np.ndarray) -> tuple[Any, n
         array = np.ascontiguousarray(values, np.float64 if values.dtype.itemsize > 4 else np.float32)
         precision = lib.FloatPrecision.E57_DOUBLE if array.itemsize == 8 else lib.FloatPrecision.E57_SINGLE
         return lib.FloatNode(image, 0.0, precision), array
+    # long long, since pye57 takes NumPy's int64 (a C long) for 32 bits.
     array = np.ascontiguousarray(values, np.longlong)
     low, high = int(array.min()), int(array.max())
     if values.dtype.kind in "iu" and values.dtype.itemsize < 8:

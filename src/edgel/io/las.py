@@ -282,7 +282,7 @@ def _fits(dimension: laspy.DimensionInfo, column: np.ndarray) -> bool:
         return True  # on the grid of the file it came from
     if not len(column):
         return True
-    low, high = column.min(), column.max()
+    low, high = column.min().item(), column.max().item()  # a float16 overflows when it is compared
     whole = column.dtype.kind in "biu" or bool((np.rint(column) == column).all())
     return bool(whole and low >= dimension.min and high <= dimension.max)
 
