@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from edgel.cli import convert, detect, info, normals
+from edgel.cli import convert, demo, detect, info, normals
 from edgel.cli.options import help_text
 
 _HELP = """Find the edges of 3D point clouds, and their normals, without tuning.
@@ -15,7 +15,7 @@ _HELP = """Find the edges of 3D point clouds, and their normals, without tuning.
 \b
   edgel info scan.ply                   what the file holds
   edgel detect scan.ply -o edges.ply    its edge points, with kind and normal
-  edgel demo                            two pipe fittings, and a report to look at
+  edgel demo                            two pipe fittings, with a report
 
 Reads PLY, PCD, LAS/LAZ, E57, XYZ/TXT/CSV/ASC/PTS, NPY/NPZ and depth images (PNG, TIFF, NPY); writes all but the images.
 """
@@ -52,3 +52,4 @@ app.command(help=help_text(detect.HELP), epilog=_EPILOG)(detect.detect)
 app.command(help=help_text(normals.HELP), epilog=_EPILOG)(normals.normals)
 app.command(help=help_text(info.HELP), epilog=_EPILOG)(info.info)
 app.command(help=help_text(convert.HELP), epilog=_EPILOG)(convert.convert)
+app.command(help=help_text(demo.HELP), epilog=_EPILOG)(demo.demo)
