@@ -1,4 +1,6 @@
+import shutil
 import struct
+import subprocess
 from contextlib import suppress
 
 import numpy as np
@@ -248,3 +250,27 @@ def test_pypcd4_reads_ours_and_we_read_its(tmp_path, shared_data):
     for file in shared_data.glob("kinect_*/*.pcd"):
         table = pypcd4.PointCloud.from_path(file)
         np.testing.assert_array_equal(table.numpy(("x", "y", "z")), read(file).xyz.astype(np.float32))
+
+
+@pytest.mark.parametrize(("mode", "data"), [("0", "ascii"), ("1", "binary"), ("2", "binary_compressed")])
+def test_pcl_reads_ours_and_we_read_its(tmp_path, mode, data):
+    tool = shutil.which("pcl_convert_pcd_ascii_binary")
+    if tool is None:
+        pytest.skip("PCL's tools are not installed (pcl-tools)")
+    rng = np.random.default_rng(0)
+    xyz = rng.integers(-1000, 1000, (12, 3)) / 8
+    xyz[5] = np.nan
+    attributes: dict[str, np.ndarray] = {}
+    for name in ("red", "green", "blue"):
+        attributes[name] = rng.integers(0, 256, 12).astype(np.uint8)
+    attributes["label"] = rng.integers(0, 2**32, 12, dtype=np.uint32)
+    cloud = Cloud(xyz, attributes, (3, 4), np.array([1.0, 2, 3]))
+    write(tmp_path / "a.pcd", cloud)
+    command = [tool, str(tmp_path / "a.pcd"), str(tmp_path / "b.pcd"), mode]
+    subprocess.run(command, check=True, capture_output=True, timeout=60)
+    assert f"DATA {data}\n".encode() in (tmp_path / "b.pcd").read_bytes()
+    found = read(tmp_path / "b.pcd")
+    assert_same(found, cloud)
+    assert found.shape == (3, 4)
+    assert found.viewpoint is not None
+    assert found.viewpoint.tolist() == [1, 2, 3]
