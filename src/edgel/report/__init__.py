@@ -12,9 +12,11 @@ from edgel.cloud import Cloud
 from edgel.edges import Edges
 from edgel.figures import draw_figures
 from edgel.io.files import replacing
-from edgel.page import opening, page, section
+from edgel.report.page import opening, page, section
+from edgel.report.tables import Table, count_table, parameter_table, time_table
 from edgel.synth import Part
-from edgel.tables import Table, count_table, parameter_table, time_table
+
+__all__ = ["Case", "Table", "make_directory", "write_report"]
 
 PAGE = "report.html"
 

@@ -7,7 +7,7 @@ import html
 from collections.abc import Sequence
 
 from edgel.figures import FigureImage
-from edgel.tables import Table, machine_table
+from edgel.report.tables import Table, machine_table
 
 
 def section(name: str, figures: Sequence[FigureImage], tables: Sequence[Table]) -> str:
