@@ -274,3 +274,19 @@ def test_pcl_reads_ours_and_we_read_its(tmp_path, mode, data):
     assert found.shape == (3, 4)
     assert found.viewpoint is not None
     assert found.viewpoint.tolist() == [1, 2, 3]
+
+
+def test_the_filler_viewpoint_is_none_unless_organized(tmp_path):
+    header = (
+        "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {}\nHEIGHT {}\nVIEWPOINT {} 1 0 0 0\n"
+    )
+    body = "POINTS 4\nDATA ascii\n" + "1 2 3\n" * 4
+    for size, viewpoint, expected in (
+        ((4, 1), "0 0 0", None),
+        ((2, 2), "0 0 0", [0, 0, 0]),
+        ((4, 1), "0 1 0", [0, 1, 0]),
+    ):
+        path = tmp_path / "a.pcd"
+        path.write_text(header.format(*size, viewpoint) + body)
+        found = read(path).viewpoint
+        assert (None if found is None else found.tolist()) == expected

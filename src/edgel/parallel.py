@@ -64,5 +64,10 @@ def run_slices(compiled: Callable[..., Any], count: int, *arguments: Any, size: 
             compiled(start, min(start + size, count), *arguments)
         return
     jobs = [_pool(threads).submit(compiled, start, min(start + size, count), *arguments) for start in starts[1:]]
-    for job in jobs:
-        job.result()
+    try:
+        for job in jobs:
+            job.result()
+    except BaseException:  # Ctrl-C too: what has not begun need not run any more
+        for job in jobs:
+            job.cancel()
+        raise

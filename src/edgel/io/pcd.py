@@ -34,9 +34,9 @@ def read(path: str | os.PathLike[str]) -> Cloud:
     Cloud
         Fields as attributes of their own type, (N, C) where COUNT is C; padding fields (``_``) left out. Packed ``rgb``
         or ``rgba`` becomes ``red``, ``green``, ``blue`` (uint8), and ``alpha`` from ``rgba`` when it is not 0 or 255
-        throughout. HEIGHT above 1 makes the cloud organized. The translation of VIEWPOINT is the viewpoint; all seven
-        numbers are in ``metadata["pcd_viewpoint"]``. Coordinates of an ascii file are parsed as double even where SIZE
-        is 4.
+        throughout. HEIGHT above 1 makes the cloud organized. The translation of VIEWPOINT is the viewpoint (none where it
+        is 0 0 0, PCL's filler, in a cloud that is not organized); all seven numbers are in
+        ``metadata["pcd_viewpoint"]``. Coordinates of an ascii file are parsed as double even where SIZE is 4.
 
     Raises
     ------
@@ -64,6 +64,8 @@ def read(path: str | os.PathLike[str]) -> Cloud:
             attributes[field] = values
     shape = (header.height, header.width) if header.height > 1 and header.count else None
     viewpoint = np.array(header.viewpoint[:3]) if header.viewpoint else None
+    if viewpoint is not None and shape is None and not viewpoint.any():
+        viewpoint = None  # what every writer puts where no sensor is known; a map in UTM is not seen from 0, 0, 0
     metadata = {"pcd_viewpoint": header.viewpoint} if header.viewpoint else {}
     return Cloud(xyz, attributes, shape, viewpoint, None, metadata)
 
