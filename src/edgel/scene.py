@@ -15,7 +15,7 @@ _LIGHT = np.array([-0.30, 0.42, 0.86])  # towards the light: from the left, abov
 _AMBIENT = 0.5  # how far round the light reaches, so that slopes away from it still differ
 _DISC = 1.1  # radius of a disc in point spacings: neighbours overlap even round a missing point
 _LARGEST = 1 / 110  # largest radius of a disc, as a share of the picture's smaller side: no blots
-_THROUGH = 6.0  # how far behind what covers them, in spacings, points on top still show
+_THROUGH = 3.0  # how far behind what covers them, in spacings, points on top still show
 
 
 class Scene:

@@ -20,7 +20,8 @@ def opening(title: str, findings: Sequence[str], tables: Sequence[Table]) -> str
     """Set what comes first: the heading, the findings, and the tables of all clouds together."""
     items = "".join(f"<li>{html.escape(finding)}</li>" for finding in findings)
     listed = f'<ul class="findings">{items}</ul>' if items else ""
-    return f"<h1>{html.escape(title)}</h1>{listed}{''.join(map(_table, tables))}"
+    own = "".join(map(_table, tables))
+    return f'<h1>{html.escape(title)}</h1>{listed}<div class="tables">{own}</div>'
 
 
 def _figure(figure: FigureImage) -> str:
@@ -88,7 +89,8 @@ th, td { text-align: left; padding: .25rem .9rem .25rem 0; border-bottom: 1px so
 td { vertical-align: top; }
 th { vertical-align: bottom; color: var(--soft); font-weight: 600; }
 .number { text-align: right; }
-.note { color: var(--soft); font-size: .88rem; max-width: 44rem; margin: .4rem 0 0; }
+/* A note is as wide as its table, so that tables stand side by side. */
+.note { color: var(--soft); font-size: .88rem; width: 0; min-width: max(100%, 17rem); margin: .4rem 0 0; }
 @media print {
   :root { --ink: #000000; --soft: #444444; --rule: #bbbbbb; --paper: #ffffff; --tint: #f4f4f2; }
   body { font-size: 11pt; }
