@@ -15,7 +15,7 @@ _LIGHT = np.array([-0.30, 0.42, 0.86])  # towards the light: from the left, abov
 _AMBIENT = 0.5  # how far round the light reaches, so that slopes away from it still differ
 _DISC = 1.1  # radius of a disc in point spacings: neighbours overlap even round a missing point
 _LARGEST = 1 / 110  # largest radius of a disc, as a share of the picture's smaller side: no blots
-_THROUGH = 3.0  # how far behind what covers them, in spacings, points on top still show
+_THROUGH = 6.0  # how far behind what covers them, in spacings, points on top still show
 
 
 class Scene:
@@ -96,8 +96,7 @@ class Scene:
 
     def on_top(self, rows: np.ndarray) -> np.ndarray:
         """Mark the fine pixels of the points in these rows of the input, unless something nearer hides them."""
-        winner = self._splat(self._finite(rows)[0], self.radius)
-        return (winner >= 0) & self._visible(winner)
+        return self._unhidden(self._finite(rows)[0], self.radius) >= 0
 
     def spread(self, rows: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
         """Choose visible points evenly among those in these rows of the input, at most one in a cell of the picture.
@@ -110,8 +109,8 @@ class Scene:
             Where they fall, in fine pixels from the left and from above.
         """
         finite, places = self._finite(rows)
-        winner = self._splat(finite, 0.0)
-        shown = np.sort(winner[(winner >= 0) & self._visible(winner)])
+        winner = self._unhidden(finite, 0.0)
+        shown = np.sort(winner[winner >= 0])
         x, y = self.columns[shown] / cell, self.downs[shown] / cell
         cells = np.floor(y) * np.ceil(self.width / cell) + np.floor(x)
         nearest_middle = np.lexsort((shown, (x % 1 - 0.5) ** 2 + (y % 1 - 0.5) ** 2, cells))
@@ -152,10 +151,16 @@ class Scene:
         winner[(pixel[shown, None] + disc).ravel()] = far_first[shown].repeat(len(disc))
         return winner.reshape(-1, wide)[rim : rim + self.height, rim : rim + self.width]
 
-    def _visible(self, winner: np.ndarray) -> np.ndarray:
-        """Mark fine pixels in which these points lie not far behind what the picture shows there."""
-        behind = self.distance[winner] - self._depth
-        return behind <= _THROUGH * max(self._spacing, self.radius) / FINE * self._footprint(self._depth)
+    def _unhidden(self, which: np.ndarray, radius: float) -> np.ndarray:
+        """Draw some of the points as `_splat` does, without those that lie behind what the picture shows."""
+        slack = _THROUGH * max(self._spacing, self.radius) / FINE
+        limit = self._depth + slack * self._footprint(self._depth)
+        # First by the points' own pixels: through gaps of a nearer surface shreds of farther discs would shine.
+        which = which[self._inside[which]]
+        down, right = self.downs[which].astype(np.int64), self.columns[which].astype(np.int64)
+        which = which[self.distance[which] <= limit[down, right]]
+        winner = self._splat(which, radius)
+        return np.where(self.distance[winner] <= limit, winner, -1)
 
     def _footprint(self, depth: np.ndarray) -> np.ndarray | float:
         """Size of a pixel on the surface, in the cloud's unit: in perspective it grows with the distance."""
