@@ -16,6 +16,7 @@ _AMBIENT = 0.5  # how far round the light reaches, so that slopes away from it s
 _DISC = 1.1  # radius of a disc in point spacings: neighbours overlap even round a missing point
 _LARGEST = 1 / 110  # largest radius of a disc, as a share of the picture's smaller side: no blots
 _THROUGH = 6.0  # how far behind what covers them, in spacings, points on top still show
+_STEEPEST = 0.03  # the same at least, as a share of the picture's smaller side: outlines of dense clouds are that steep
 
 
 class Scene:
@@ -153,14 +154,15 @@ class Scene:
 
     def _unhidden(self, which: np.ndarray, radius: float) -> np.ndarray:
         """Draw some of the points as `_splat` does, without those that lie behind what the picture shows."""
-        slack = _THROUGH * max(self._spacing, self.radius) / FINE
-        limit = self._depth + slack * self._footprint(self._depth)
+        slack = _THROUGH * max(self._spacing, self.radius)
+        steep = max(slack, _STEEPEST * min(self.width, self.height))
+        size = self._footprint(self._depth) / FINE
         # First by the points' own pixels: through gaps of a nearer surface shreds of farther discs would shine.
         which = which[self._inside[which]]
         down, right = self.downs[which].astype(np.int64), self.columns[which].astype(np.int64)
-        which = which[self.distance[which] <= limit[down, right]]
+        which = which[self.distance[which] <= (self._depth + steep * size)[down, right]]
         winner = self._splat(which, radius)
-        return np.where(self.distance[winner] <= limit, winner, -1)
+        return np.where(self.distance[winner] <= self._depth + slack * size, winner, -1)
 
     def _footprint(self, depth: np.ndarray) -> np.ndarray | float:
         """Size of a pixel on the surface, in the cloud's unit: in perspective it grows with the distance."""
