@@ -35,8 +35,8 @@ def code_1_hits(points: np.ndarray, found: paper.PaperEdges) -> np.ndarray:
     extent = grid.upper - grid.lower
     hits = []
     for col, row in zip(*np.nonzero(found.edge_map.T), strict=True):
-        x = col * extent[0] / grid.width + grid.lower[0]
-        y = row * extent[1] / grid.height + grid.lower[1]
+        x = (col - grid.frame) * extent[0] / grid.width + grid.lower[0]
+        y = (row - grid.frame) * extent[1] / grid.height + grid.lower[1]
         first, last = np.searchsorted(by_x[:, 0], [x - t, x + t])
         hits.append(np.count_nonzero(np.abs(by_x[first:last, 1] - y) < t))
     return np.array(hits)

@@ -27,7 +27,7 @@ def measure(scan: synth.Scan, spacings: float, high: float, tolerance: float) ->
     outline = np.concatenate([curve.points for curve in scan.part.edges if curve.kind != "crease"])
     rows, cols = np.nonzero(found.edge_map)
     size = np.array(found.grid.pixel)
-    centres = np.c_[(np.c_[cols, rows] + 0.5) * size + found.grid.lower[:2], np.zeros(len(rows))]
+    centres = np.c_[found.grid.centres(rows, cols), np.zeros(len(rows))]
     stray = knn(build_index(flat(truth)), centres, 1).distances[:, 0] > 2 * size.max()
     reached = knn(build_index(flat(xyz[found.index])), flat(outline), 1).distances[:, 0] < 1.0
     return f"{100 * found.share:5.1f} | {100 * stray.mean():4.1f} | {100 * reached.mean():4.0f}"

@@ -2,6 +2,7 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 
 @pytest.fixture(scope="session")
@@ -11,3 +12,9 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"test data not found in {folder}; set EDGEL_DATA")
     return folder
+
+
+# No deadline: the first example compiles kernels. CI draws the same examples every time, people draw new ones.
+settings.register_profile("local", deadline=None)
+settings.register_profile("ci", deadline=None, derandomize=True)
+settings.load_profile("ci" if os.environ.get("CI") else "local")

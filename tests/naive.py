@@ -110,15 +110,18 @@ def canny(f, k, sigma, low, high):
     return hysteresis(non_maximum_suppression(gx, gy), low, high)
 
 
-def code_1(points, edges, t):
-    """The paper's Code 1, corrected: ``temp`` cleared for every pixel, each point once. Returns the set of rows."""
-    H, W = edges.shape
+def code_1(points, edges, t, frame=0):
+    """The paper's Code 1, corrected: ``temp`` cleared for every pixel, each point once. Returns the set of rows.
+
+    With a frame, i and j of the edge map run from 1 - frame to W + frame and H + frame.
+    """
+    H, W = edges.shape[0] - 2 * frame, edges.shape[1] - 2 * frame
     f = np.asarray(points)
     xmin, ymin = f[:, 0].min(), f[:, 1].min()
     xmax, ymax = f[:, 0].max(), f[:, 1].max()
     pc = set()
     for row, col in zip(*np.nonzero(edges), strict=True):
-        i, j = int(col) + 1, int(row) + 1
+        i, j = int(col) + 1 - frame, int(row) + 1 - frame
         newx = (i - 1) * (xmax - xmin) / W + xmin  # eq. 18
         newy = (j - 1) * (ymax - ymin) / H + ymin  # eq. 19
         m = np.flatnonzero(np.abs(f[:, 0] - newx) < t)

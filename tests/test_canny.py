@@ -20,7 +20,7 @@ def _random_image(rng):
     return np.where(rng.random((height, width)) < 0.4, 0.0, rng.uniform(100, 255, (height, width)))
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(IMAGES, st.sampled_from([(0, 1.0), (1, 1.4), (2, 1.4), (2, 2.0)]), st.floats(0, 300), st.floats(1, 3))
 def test_every_step_is_that_of_the_equations(image, kernel, low, ratio):
     k, sigma = kernel

@@ -61,7 +61,7 @@ def test_a_plane_parallel_to_z_is_like_any_other():
     np.testing.assert_array_equal(edgel.detect(flat[:, [2, 0, 1]]).index, expected.index)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.integers(0, 2**32 - 1))
 def test_motion_scale_and_order_change_nothing(seed):
     rng = np.random.default_rng(seed)

@@ -20,6 +20,7 @@ LAYERS = [
     {"neighbors"},
     {"normals", "canny"},
     {"project", "crease", "boundary", "edges"},
+    {"metrics"},
     {"paper"},
     {"detect"},
 ]

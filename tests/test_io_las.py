@@ -67,7 +67,7 @@ def test_extra_dimensions_are_kept_as_declared(tmp_path, suffix):
     assert kept["normal"].num_elements == 3
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(clouds(finite=True), st.sampled_from(SUFFIXES))
 def test_any_cloud_round_trips(tmp_path_factory, cloud, suffix):
     file = tmp_path_factory.mktemp("las") / f"a{suffix}"
@@ -181,7 +181,7 @@ def test_truncated(airborne, tmp_path):
         read(tmp_path / "a.las")
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 @given(st.data())
 def test_cut_or_damaged_anywhere(tmp_path_factory, data):
     file = tmp_path_factory.mktemp("las") / f"a{data.draw(st.sampled_from(SUFFIXES))}"

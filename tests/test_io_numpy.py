@@ -17,7 +17,7 @@ CAMERA = Intrinsics(fx=100, fy=200, cx=2, cy=1)
 DEPTH = np.array([[0, 1000, 2000, 3000, 4000]] * 3, np.uint16)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(clouds(), st.sampled_from([".npy", ".npz"]))
 def test_round_trip(tmp_path_factory, cloud, suffix):
     file = tmp_path_factory.mktemp("numpy") / f"a{suffix}"
@@ -102,7 +102,7 @@ def test_promise_of_a_trillion_points_is_not_believed(tmp_path):
         read(tmp_path / "a.npz")
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.data())
 def test_cut_or_damaged_anywhere(tmp_path_factory, data):
     suffix = data.draw(st.sampled_from([".npy", ".npz"]))

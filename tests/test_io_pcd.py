@@ -37,7 +37,7 @@ def lzf_literals(raw):
     return b"".join(bytes([len(raw[i : i + 32]) - 1]) + raw[i : i + 32] for i in range(0, len(raw), 32))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(clouds())
 def test_round_trip(tmp_path_factory, cloud):
     file = tmp_path_factory.mktemp("pcd") / "a.pcd"
@@ -175,7 +175,7 @@ def test_lzf_copies_and_damage():
         assert lzf_decompress(np.frombuffer(broken, np.uint8), out) == -1
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.data())
 def test_cut_or_damaged_anywhere(tmp_path_factory, shared_data, data):
     packed = shared_data / "malformed" / "pypcd4_pcd" / "binary_compressed_organized.pcd"

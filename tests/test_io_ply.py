@@ -24,7 +24,7 @@ def read_bytes(raw):
     return read(BytesIO(raw))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(clouds(dtypes=("bool", "i1", "u1", "i2", "u2", "i4", "u4", "f2", "f4", "f8")))
 def test_round_trip(cloud):
     file = BytesIO()
@@ -257,7 +257,7 @@ def test_shared_files_as_plyfile_reads_them(shared_data):
         assert list(found.attributes) == [p.name for p in vertex.properties if p.name not in "xyz"]
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.data())
 def test_cut_or_damaged_anywhere(data):
     file = BytesIO()

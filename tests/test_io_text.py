@@ -20,7 +20,7 @@ def read_text(tmp_path, text, suffix=".txt"):
     return read(file)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(clouds(), st.sampled_from(SUFFIXES))
 def test_round_trip(tmp_path_factory, cloud, suffix):
     file = tmp_path_factory.mktemp("text") / f"a{suffix}"
@@ -162,7 +162,7 @@ def test_speed(tmp_path):
     np.testing.assert_array_equal(found.xyz, cloud.xyz)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.data())
 def test_any_text(tmp_path_factory, data):
     words = st.sampled_from(

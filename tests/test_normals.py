@@ -29,7 +29,7 @@ def test_planes_are_those_of_an_svd(k, shift):
     _, rows = KDTree(centred).query(centred, k)
     compared = 0
     for p in range(0, len(points), 7):
-        normal, offset, residual, s = naive.plane(centred[rows[p]])
+        normal, offset, residual, s = naive.plane(centred[np.asarray(rows)[p]])
         if s[1] ** 2 - s[2] ** 2 < 1e-3 * s[0] ** 2:  # a degenerate neighbourhood has no one normal
             continue
         compared += 1

@@ -172,7 +172,7 @@ def _thinned(cloud: Cloud) -> Cloud:
 
 def _figure_3(edges: PaperEdges, name: str, part: Part | None) -> _Content:
     grid = edges.grid
-    extent = (float(grid.lower[0]), float(grid.upper[0]), float(grid.lower[1]), float(grid.upper[1]))
+    extent = grid.extent
     edge_map = np.where(edges.edge_map, 0, 255).astype(np.uint8)[::-1, :, None].repeat(3, axis=2)
     panels = [
         _Panel(_projection(edges), f"(a) projection, {grid.width} x {grid.height} pixels", True, extent),

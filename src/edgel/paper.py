@@ -35,9 +35,10 @@ class PaperEdges(Edges):
     ----------
     grid : PixelGrid
         Where the pixels lie in the cloud.
-    image : (H, W) float64
-        The projection in grey, 0 where no point falls (fig. 1c, 3a); row 0 at the smallest y.
-    edge_map : (H, W) bool
+    image : (H + 2, W + 2) float64
+        The projection in grey, 0 where no point falls (fig. 1c, 3a); row 0 at the smallest y. It has a frame of one
+        empty pixel: the part touches the border, and its outline may be steepest just outside.
+    edge_map : (H + 2, W + 2) bool
         Canny's edge pixels (fig. 3b).
     """
 
@@ -75,9 +76,9 @@ def detect(
     low, high : float
         Thresholds on the gradient of the smoothed grey, in Sobel units: a step of g grey levels gives about 2.3 g.
     tolerance : float, optional
-        Half the side t of the window around each edge pixel, in the cloud's unit. Default:
-        1.8 % of the root of the image's area, and at least a pixel; so the share of edge points, about 10 % on the paper's
-        parts, does not depend on how densely they were scanned.
+        Half the side t of the window around each edge pixel, in the cloud's unit. Default: 1.8 % of the root of the
+        image's area, and at least a pixel; so the share of edge points, about 10 % on the paper's parts, does not
+        depend on how densely they were scanned.
     gray_min : float
         Grey of the lowest point, 0 to 255 (eq. 5); 0 is where no point falls.
     num_neighbors : int
@@ -102,7 +103,7 @@ def detect(
     >>> x, y = np.meshgrid(np.linspace(0, 1, 200), np.linspace(0, 1, 200))
     >>> edges = edgel.paper.detect(np.c_[x.ravel(), y.ravel(), (x.ravel() > 0.5) * 0.2])
     >>> edges.image.shape, 0.1 < edges.share < 0.5
-    ((50, 50), True)
+    ((52, 52), True)
     """
     if not 0 <= gray_min <= 255:
         raise ValueError(f"gray_min: expected a grey level from 0 to 255, got {gray_min}")
@@ -111,7 +112,7 @@ def detect(
     stages = Stages(progress)
     with stages("projection"):
         grid = choose_grid(checked.xyz, width, height)
-        image = grey_image(project(checked.xyz, grid), grid, gray_min)
+        image = np.pad(grey_image(project(checked.xyz, grid), grid, gray_min), grid.frame)
     with stages("canny"):
         found = canny_of_projection(image, kernel_size, sigma, low, high)
     with stages("back-projection"):
@@ -148,7 +149,10 @@ def detect(
 
 
 def choose_grid(xyz: np.ndarray, width: int | None, height: int | None) -> PixelGrid:
-    """Lay the image over the cloud's bounding box (eq. 3-4), with square pixels where a size is not given."""
+    """Lay the image over the cloud's bounding box (eq. 3-4), with square pixels where a size is not given.
+
+    A frame of one pixel goes round it: no point falls there, so grey is 0, and Canny may find the outline there.
+    """
     for name, size in (("width", width), ("height", height)):
         if size is not None and (not isinstance(size, int | np.integer) or size < 1):
             raise ValueError(f"{name}: expected a number of pixels above 0, got {size!r}")
@@ -172,7 +176,7 @@ def choose_grid(xyz: np.ndarray, width: int | None, height: int | None) -> Pixel
         raise ValueError(
             f"width, height: an image of {columns} x {rows} pixels is larger than {_MAX_PIXELS:,}; give a smaller size"
         )
-    return PixelGrid(int(columns), int(rows), lower, upper)
+    return PixelGrid(int(columns), int(rows), lower, upper, frame=1)
 
 
 def choose_tolerance(tolerance: float | None, grid: PixelGrid) -> float:
@@ -188,8 +192,8 @@ def choose_tolerance(tolerance: float | None, grid: PixelGrid) -> float:
 def canny_of_projection(image: np.ndarray, kernel_size: int, sigma: float, low: float, high: float) -> CannyResult:
     """Run Canny on a projection (eq. 7-17, sections 3.1-3.4), with empty pixels all round it.
 
-    The cloud touches all four borders of its image; no point falls beyond them, so grey is 0 there too. Without the
-    frame the rims at the borders would be missed.
+    The cloud touches all four borders of its image; no point falls beyond them, so grey is 0 there too. If the border
+    pixels were repeated instead, the rims at the borders would be missed.
     """
     frame = kernel_size // 2 + 2
     found = canny(np.pad(image, frame), kernel_size=kernel_size, sigma=sigma, low=low, high=high)

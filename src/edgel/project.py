@@ -20,21 +20,36 @@ class PixelGrid:
     Attributes
     ----------
     width, height : int
-        Number of columns (x) and rows (y).
+        Number of columns (x) and rows (y) over the cloud's bounding box.
     lower, upper : (3,) float64
         Corners of the cloud's bounding box, in its unit.
+    frame : int
+        Further columns and rows of empty pixels on every side of the image.
     """
 
     width: int
     height: int
     lower: np.ndarray
     upper: np.ndarray
+    frame: int = 0
 
     @property
     def pixel(self) -> tuple[float, float]:
         """Size of a pixel along x and y, in the cloud's unit."""
         extent = self.upper - self.lower
         return float(extent[0] / self.width), float(extent[1] / self.height)
+
+    @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """Left, right, lower and upper border of the image, its frame with it, in the cloud's unit."""
+        across, along = self.frame * self.pixel[0], self.frame * self.pixel[1]
+        (left, low, _), (right, high, _) = self.lower.tolist(), self.upper.tolist()
+        return left - across, right + across, low - along, high + along
+
+    def centres(self, rows: np.ndarray, cols: np.ndarray) -> np.ndarray:
+        """Return x and y (M, 2) of the middle of pixels of the image."""
+        places = np.column_stack([cols, rows]) - self.frame + 0.5
+        return places * self.pixel + self.lower[:2]
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,6 +141,7 @@ def back_project(
     xyz : (N, 3) float64
     grid : PixelGrid
     edges : (H, W) bool
+        The frame of the grid with it.
     magnitude : (H, W) float64
     tolerance : float
         Half the side of the window, in the cloud's unit.
@@ -133,7 +149,8 @@ def back_project(
     counts = _summed(edges.astype(np.int64))
     totals = _summed(np.where(edges, magnitude, 0.0))
     strength = np.empty(len(xyz))
-    run_slices(_window_means, len(xyz), xyz, grid.lower, grid.upper, counts, totals, tolerance, strength, size=65536)
+    at = (grid.lower, grid.upper, grid.frame)
+    run_slices(_window_means, len(xyz), xyz, *at, counts, totals, tolerance, strength, size=65536)
     rows = np.flatnonzero(strength >= 0)
     return BackProjection(rows, strength[rows])
 
@@ -160,25 +177,25 @@ def _highest(pixels, xyz, highest):
 
 
 @kernel
-def _window(value, lower, extent, count, tolerance):
-    """First and one past the last pixel along an axis whose corner is nearer than the tolerance."""
+def _window(value, lower, extent, count, frame, tolerance):
+    """First and one past the last pixel of an axis, its frame with it, whose corner is nearer than the tolerance."""
     size = extent / count
-    first = max(math.floor((value - tolerance - lower) / size), 0)
-    last = min(math.ceil((value + tolerance - lower) / size), count - 1)
+    first = max(math.floor((value - tolerance - lower) / size), -frame)
+    last = min(math.ceil((value + tolerance - lower) / size), count - 1 + frame)
     # The division only guesses; whether a corner counts is decided by the very comparison of Code 1.
     while first <= last and not abs(value - (first * extent / count + lower)) < tolerance:
         first += 1
     while last >= first and not abs(value - (last * extent / count + lower)) < tolerance:
         last -= 1
-    return first, last + 1
+    return first + frame, last + 1 + frame
 
 
 @kernel
-def _window_means(start, stop, xyz, lower, upper, counts, totals, tolerance, means):
-    height, width = counts.shape[0] - 1, counts.shape[1] - 1
+def _window_means(start, stop, xyz, lower, upper, frame, counts, totals, tolerance, means):
+    height, width = counts.shape[0] - 1 - 2 * frame, counts.shape[1] - 1 - 2 * frame
     for p in range(start, stop):
-        left, right = _window(xyz[p, 0], lower[0], upper[0] - lower[0], width, tolerance)
-        low, high = _window(xyz[p, 1], lower[1], upper[1] - lower[1], height, tolerance)
+        left, right = _window(xyz[p, 0], lower[0], upper[0] - lower[0], width, frame, tolerance)
+        low, high = _window(xyz[p, 1], lower[1], upper[1] - lower[1], height, frame, tolerance)
         count = counts[high, right] - counts[low, right] - counts[high, left] + counts[low, left]
         if count > 0:
             total = totals[high, right] - totals[low, right] - totals[high, left] + totals[low, left]

@@ -63,10 +63,9 @@ def found_lengths(scan: Scan, edges: PaperEdges, *, reach: float = 1.0) -> tuple
     >>> [(one.kind, one.with_point > 0.9) for one in found]
     [('boundary', True), ('occluding', True)]
     """
-    grid, flat = edges.grid, np.array([1.0, 1.0, 0.0])
+    flat = np.array([1.0, 1.0, 0.0])
     rows, columns = np.nonzero(edges.edge_map)
-    centres = np.column_stack([columns + 0.5, rows + 0.5, np.zeros(len(rows))]) * (*grid.pixel, 0.0)
-    pixels = centres + grid.lower * flat
+    pixels = np.column_stack([edges.grid.centres(rows, columns), np.zeros(len(rows))])
     points = scan.cloud.xyz[edges.index] * flat
     found = []
     for kind in EDGE_KINDS:

@@ -34,8 +34,8 @@ def read(path: str | os.PathLike[str]) -> Cloud:
     Cloud
         Fields as attributes of their own type, (N, C) where COUNT is C; padding fields (``_``) left out. Packed ``rgb``
         or ``rgba`` becomes ``red``, ``green``, ``blue`` (uint8), and ``alpha`` from ``rgba`` when it is not 0 or 255
-        throughout. HEIGHT above 1 makes the cloud organized. The translation of VIEWPOINT is the viewpoint (none where it
-        is 0 0 0, PCL's filler, in a cloud that is not organized); all seven numbers are in
+        throughout. HEIGHT above 1 makes the cloud organized. The translation of VIEWPOINT is the viewpoint (none where
+        it is 0 0 0, PCL's filler, in a cloud that is not organized); all seven numbers are in
         ``metadata["pcd_viewpoint"]``. Coordinates of an ascii file are parsed as double even where SIZE is 4.
 
     Raises
