@@ -1,9 +1,10 @@
 # make demo: the paper's two parts, its tables beside ours, a report. make test: everything that must hold.
 PYTHON ?= python3
 VENV := .venv
+LOCK := --no-emit-index-url --no-header --python-version 3.11
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint install lock clean
+.PHONY: demo test lint bench bench-quick install lock clean
 
 demo: install
 	$(BIN)/edgel demo -o demo
@@ -15,6 +16,18 @@ lint: install
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
+
+# The benchmark needs more (Open3D and build123d are large); PCL and CGAL come from Debian, build.sh says how.
+bench: $(VENV)/installed-bench
+	$(BIN)/python benchmarks/bench.py
+
+bench-quick: $(VENV)/installed-bench
+	$(BIN)/python benchmarks/bench.py --quick
+
+$(VENV)/installed-bench: $(VENV)/installed requirements-bench.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --requirement requirements-bench.lock
+	-bash benchmarks/rivals/build.sh
+	touch $@
 
 install: $(VENV)/installed
 
@@ -28,7 +41,8 @@ $(VENV)/installed: pyproject.toml requirements.lock
 # Versions of everything, for every platform, from pyproject.toml.
 lock:
 	$(BIN)/python -m pip install --quiet uv
-	$(BIN)/uv pip compile --universal --upgrade --all-extras --no-emit-index-url --no-header --python-version 3.11 --output-file requirements.lock pyproject.toml
+	$(BIN)/uv pip compile --universal --upgrade --extra dev --extra e57 $(LOCK) --output-file requirements.lock pyproject.toml
+	$(BIN)/uv pip compile --universal --upgrade --extra bench --constraint requirements.lock $(LOCK) --output-file requirements-bench.lock pyproject.toml
 
 clean:
 	rm -rf $(VENV) demo
