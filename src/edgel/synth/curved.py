@@ -1,0 +1,152 @@
+"""Curved surfaces with known edges, or with none at all. Lengths in millimetres."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from edgel.synth.solid import Solid, flat_normals, grid_triangles, make_solid
+
+_CHORD = 0.003  # of the usual spacing, along each of the two directions of a patch
+
+
+def sphere(*, radius: float = 25.0) -> Solid:
+    """Make a sphere: no edge at all."""
+    spacing = radius / 50
+    count = _steps(radius, 2 * np.pi, spacing)
+    u, v = np.meshgrid(np.linspace(0, 2 * np.pi, 2 * (count // 2) + 1), np.linspace(-np.pi / 2, np.pi / 2, count // 2))
+    normals = np.stack([np.cos(v) * np.cos(u), np.cos(v) * np.sin(u), np.sin(v)], axis=-1).swapaxes(0, 1)
+    return _patches("sphere", [(radius * normals, normals)], spacing=spacing)
+
+
+def torus(*, radius: float = 30.0, tube: float = 12.0) -> Solid:
+    """Make a torus about the z axis: no edge at all."""
+    spacing = tube / 20
+    u, v = np.meshgrid(
+        np.linspace(0, 2 * np.pi, _steps(radius + tube, 2 * np.pi, spacing) + 1),
+        np.linspace(0, 2 * np.pi, _steps(tube, 2 * np.pi, spacing) + 1),
+        indexing="ij",
+    )
+    normals = np.stack([np.cos(v) * np.cos(u), np.cos(v) * np.sin(u), np.sin(v)], axis=-1)
+    ring = np.stack([np.cos(u), np.sin(u), np.zeros_like(u)], axis=-1)
+    return _patches("torus", [(radius * ring + tube * normals, normals)], spacing=spacing)
+
+
+def plane(*, side: float = 120.0) -> Solid:
+    """Make a square in z = 0: no crease, one boundary."""
+    flat = side * np.array([[[0, 0, 0], [0, 1, 0]], [[1, 0, 0], [1, 1, 0]]], float)
+    return _patches("plane", [(flat, np.broadcast_to([0.0, 0.0, 1.0], flat.shape))], spacing=side / 170)
+
+
+def wavy_sheet(*, side: float = 120.0, amplitude: float = 4.0) -> Solid:
+    """Make the sheet z = a sin(2 pi x / 40) cos(2 pi y / 50): no crease, one boundary, least radius about 10 mm."""
+    x, y = np.meshgrid(np.linspace(0, side, 301), np.linspace(0, side, 301), indexing="ij")
+    k, m = 2 * np.pi / 40, 2 * np.pi / 50
+    z = amplitude * np.sin(k * x) * np.cos(m * y)
+    slope_x = amplitude * k * np.cos(k * x) * np.cos(m * y)
+    slope_y = -amplitude * m * np.sin(k * x) * np.sin(m * y)
+    normals = _unit(np.stack([-slope_x, -slope_y, np.ones_like(z)], axis=-1))
+    return _patches("wavy_sheet", [(np.stack([x, y, z], axis=-1), normals)], spacing=side / 170)
+
+
+def bezier_ridge(*, side: float = 120.0) -> Solid:
+    """Make two bicubic Bezier patches that meet in a curved crease, turning from about 20 to about 90 degrees.
+
+    A Bezier patch is a NURBS patch with equal weights and no inner knots.
+    """
+    step = side / 6
+    y = np.linspace(0, side, 4)
+    seam = np.stack([np.array([0, 0.4, -0.4, 0]) * step, y, np.array([0, 0.5, -0.2, 0.3]) * step], axis=-1)
+    fall = np.array([0.18, 0.4, 0.7, 1.0]) * step
+    nets = []
+    for way in (-1, 1):
+        net = np.empty((4, 4, 3))
+        net[0] = seam
+        for i, (out, drop) in enumerate([(1, 1.0), (2, 1.3), (3, 0.9)], start=1):
+            net[i] = np.stack([np.full(4, way * out * step), y, seam[:, 2] - drop * fall], axis=-1)
+        net[1, :, 0] += seam[:, 0]
+        nets.append(net[::way])  # x ascends along the first axis of both, so that normals point up
+    return _patches("bezier_ridge", [_bezier(net, 161) for net in nets], spacing=side / 170)
+
+
+def gear(*, teeth: int = 16, root: float = 32.0, tip: float = 40.0, bore: float = 10.0, thick: float = 15.0) -> Solid:
+    """Make a spur gear with straight flanks about the z axis, between z = 0 and `thick`."""
+    spacing, period = 0.65, 2 * np.pi / teeth
+    arcs = [(0.0, 0.45, root, root), (0.45, 0.58, root, tip), (0.58, 0.87, tip, tip), (0.87, 1.0, tip, root)]
+    walls, caps, hole, face = [], [], [], []
+    for tooth in range(teeth):
+        for k, (start, stop, r0, r1) in enumerate(arcs):
+            round_part = r0 == r1
+            steps = max(2, _steps(r0, (stop - start) * period, spacing)) if round_part else 1
+            angle = (tooth + np.linspace(start, stop, steps + 1)) * period
+            ring = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+            outer = np.linspace(r0, r1, steps + 1)[:, None] * ring
+            corners = grid_triangles(_upright(outer, thick))
+            normals = grid_triangles(_upright(ring, 0.0)) if round_part else flat_normals(corners)
+            walls.append((corners, normals))
+            face.append(np.full(len(corners), 3 + 4 * tooth + k))
+            inner = bore * ring
+            caps.append(np.stack([outer, inner], axis=1))
+            hole.append((grid_triangles(_upright(inner, thick)[:, ::-1]), -grid_triangles(_upright(ring, 0)[:, ::-1])))
+    for z, flip in ((0.0, -1), (thick, 1)):
+        for strip in caps:
+            corners = grid_triangles(np.concatenate([strip, np.full((*strip.shape[:2], 1), z)], axis=2)[:, ::flip])
+            walls.append((corners, flat_normals(corners)))
+            face.append(np.full(len(corners), int(z > 0)))
+    walls += hole
+    face += [np.full(len(corners), 2) for corners, _ in hole]
+    corners, normals = (np.concatenate(part) for part in zip(*walls, strict=True))
+    return make_solid("gear", corners, np.concatenate(face), normals, spacing=spacing)
+
+
+def cylinder(*, radius: float = 20.0, height: float = 50.0) -> Solid:
+    """Make a solid cylinder on z = 0 about the z axis: two round creases."""
+    spacing = 0.6
+    angle = np.linspace(0, 2 * np.pi, _steps(radius, 2 * np.pi, spacing) + 1)
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    wall = _upright(radius * ring, height)
+    parts = [(grid_triangles(wall), grid_triangles(_upright(ring, 0.0)))]
+    for end, flip in ((0, -1), (1, 1)):
+        disc = np.stack([wall[:, end], np.broadcast_to([0, 0, end * height], wall[:, end].shape)], axis=1)[:, ::flip]
+        corners = grid_triangles(disc)
+        parts.append((corners, np.broadcast_to([0.0, 0.0, -1.0 if end == 0 else 1.0], corners.shape)))
+    face = np.repeat([0, 1, 2], [len(corners) for corners, _ in parts])
+    corners, normals = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return make_solid("cylinder", corners, face, normals, spacing=spacing)
+
+
+def _patches(name: str, patches: Sequence[tuple[np.ndarray, np.ndarray]], *, spacing: float) -> Solid:
+    """Join grids of points and unit normals, each (M, N, 3): every grid is one face."""
+    corners = [grid_triangles(points) for points, _ in patches]
+    normals = [grid_triangles(normal) for _, normal in patches]
+    face = np.repeat(np.arange(len(patches)), [len(part) for part in corners])
+    return make_solid(name, np.concatenate(corners), face, np.concatenate(normals), spacing=spacing)
+
+
+def _bezier(net: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points and unit normals (count, count, 3) of the bicubic patch over a net of control points (4, 4, 3)."""
+    t = np.linspace(0, 1, count)[:, None]
+    basis = np.concatenate([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3], axis=1)
+    quadratic: Callable[[np.ndarray], np.ndarray] = lambda s: np.concatenate(  # noqa: E731
+        [(1 - s) ** 2, 2 * s * (1 - s), s**2], axis=1
+    )
+    points = np.einsum("ui,vj,ijk->uvk", basis, basis, net)
+    along_u = np.einsum("ui,vj,ijk->uvk", quadratic(t), basis, np.diff(net, axis=0))
+    along_v = np.einsum("ui,vj,ijk->uvk", basis, quadratic(t), np.diff(net, axis=1))
+    return points, _unit(np.cross(along_u, along_v))
+
+
+def _upright(ring: np.ndarray, height: float) -> np.ndarray:
+    """Stand a plane curve (P, 2) up to a wall (P, 2, 3) from z = 0 to `height`."""
+    low = np.column_stack([ring, np.zeros(len(ring))])
+    return np.stack([low, low + (0, 0, height)], axis=1)
+
+
+def _steps(radius: float, angle: float, spacing: float) -> int:
+    """Count the chords that stay near enough to an arc: the sagitta of a chord over the angle a is r a^2 / 8."""
+    return int(np.ceil(angle / np.sqrt(8 * _CHORD * spacing / radius)))
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
