@@ -18,11 +18,20 @@ from .interface import OUTLINE, THREADS, Found, Rival, finite_rows, found, grid,
 METRES = 1e-3  # scenes are in mm; PCL's organized normals know metres (integral_image_normal.hpp adds 1 to the depth)
 ALL = OUTLINE | EdgeKind.CREASE
 
+# Open3D 0.20 finds no boundary where a normal is exactly along Z (its two directions in the plane come out as 0), which
+# only happens to faces along the axes without any noise. Turned by some rotation, the cloud is the same to a detector.
+_TURN = np.linalg.qr(np.array([[0.8, -0.5, 0.3], [0.4, 0.9, -0.2], [-0.3, 0.35, 0.85]]))[0]
+
 
 def _pcl_organized(cloud: edgel.Cloud, spacing: float, parameters: Mapping) -> Found:
     pose = sensor.locate(cloud, spacing)
     place = {"axes": pose.axes, "origin": pose.origin, "scale": METRES, "use_range": int(pose.wide)}
-    bits, seconds = programs.run("pcl_organized", cloud, "u1", **place, **parameters)
+    options = dict(parameters)
+    # PCL's threshold is relative to the depth; a step in spacings is the same demand on every sensor.
+    step = options.pop("depth_step", None)
+    if step is not None:
+        options["depth_threshold"] = step * spacing / pose.depth(cloud)
+    bits, seconds = programs.run("pcl_organized", cloud, "u1", **place, **options)
     # PCL's bits are NAN_BOUNDARY 1, OCCLUDING 2, OCCLUDED 4, HIGH_CURVATURE 8: the same as EdgeKind's.
     return Found(bits != 0, bits, seconds)
 
@@ -56,10 +65,12 @@ def _open3d_boundary(cloud: edgel.Cloud, spacing: float, parameters: Mapping) ->
     import open3d as o3d
 
     rows = finite_rows(cloud)
-    # It computes the angles in float32 when given so; float64 keeps it out of the rounding.
-    points = o3d.t.geometry.PointCloud(o3d.core.Tensor(np.ascontiguousarray(cloud.xyz[rows])))
+    xyz = cloud.xyz[rows]
+    points = o3d.t.geometry.PointCloud(o3d.core.Tensor(np.ascontiguousarray((xyz - xyz.mean(axis=0)) @ _TURN.T)))
+    radius = parameters["radius"] * spacing
     begin = time.perf_counter()
-    _, mask = points.compute_boundary_points(parameters["radius"] * spacing, parameters["max_nn"], parameters["angle"])
+    points.estimate_normals(parameters["max_nn"], radius)
+    _, mask = points.compute_boundary_points(radius, parameters["max_nn"], parameters["angle"])
     seconds = time.perf_counter() - begin
     return found(spread(rows, mask.numpy().astype(bool), len(cloud)), EdgeKind.BOUNDARY, seconds)
 
@@ -133,7 +144,25 @@ RIVALS = (
         finds=ALL,
         organized_only=True,
         defaults=_PCL_ORGANIZED,
-        grid=grid(_PCL_ORGANIZED),
+        grid=grid(
+            _PCL_ORGANIZED,
+            *(
+                {"smoothing": size, "method": method, "depth_step": step, "low": low, "high": high}
+                for size, method, step, low, high in (
+                    (10.0, "covariance", 5.0, 0.4, 1.1),
+                    (10.0, "covariance", 5.0, 0.8, 1.6),
+                    (10.0, "gradient", 10.0, 0.8, 1.6),
+                    (5.0, "covariance", 2.5, 0.4, 1.1),
+                    (5.0, "covariance", 5.0, 0.4, 1.1),
+                    (5.0, "covariance", 5.0, 0.8, 1.6),
+                    (5.0, "gradient", 5.0, 0.4, 1.1),
+                    (5.0, "gradient", 2.5, 0.8, 1.6),
+                    (5.0, "gradient", 5.0, 0.8, 1.6),
+                    (5.0, "gradient", 10.0, 0.8, 1.6),
+                    (3.0, "gradient", 5.0, 0.8, 1.6),
+                )
+            ),
+        ),
         missing=_program("pcl_organized"),
         run=_pcl_organized,
     ),
@@ -202,7 +231,7 @@ RIVALS = (
         finds=ALL,
         organized_only=False,
         defaults={},
-        grid=grid({}),
+        grid=(),
         missing=lambda: None,
         run=_edgel("paper"),
     ),
@@ -211,7 +240,7 @@ RIVALS = (
         finds=ALL,
         organized_only=False,
         defaults={},
-        grid=grid({}),
+        grid=(),
         missing=lambda: None,
         run=_edgel("default"),
     ),

@@ -50,7 +50,7 @@ class Rival:
     defaults : mapping
         Its documented parameters. Lengths are in point spacings.
     grid : tuple of mappings
-        What to choose from on scenes set apart for it; the defaults are the first.
+        What to choose from, besides the defaults, on scenes set apart for it.
     missing : callable
         None, or a line that says how to get it.
     run : callable
@@ -93,5 +93,5 @@ def spread(rows: np.ndarray, flags: np.ndarray, num_points: int) -> np.ndarray:
 
 
 def grid(defaults: Mapping, *changes: Mapping) -> tuple[Mapping, ...]:
-    """Return the defaults and, after them, each set of changes to them."""
-    return ({**defaults}, *({**defaults, **change} for change in changes))
+    """Return the defaults with each set of changes."""
+    return tuple({**defaults, **change} for change in changes)

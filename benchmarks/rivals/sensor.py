@@ -24,6 +24,11 @@ class Sensor:
     axes: np.ndarray
     wide: bool = False
 
+    def depth(self, cloud: edgel.Cloud) -> float:
+        """Return the median depth of a cloud as PCL sees it: Z, or the range in a wide view."""
+        seen = cloud.xyz[np.isfinite(cloud.xyz).all(axis=1)] - self.origin
+        return float(np.median(np.linalg.norm(seen, axis=1) if self.wide else seen @ self.axes[2]))
+
 
 def locate(cloud: edgel.Cloud, spacing: float) -> Sensor:
     """Find the sensor of an organized cloud.
