@@ -14,13 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from edgel.synth import EdgeCurve, Solid, make_solid
+from edgel.synth import Solid, make_solid
 
 try:
     import build123d as cad
     from OCP.BRep import BRep_Tool
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
-    from OCP.BRepTools import BRepTools
     from OCP.GeomLProp import GeomLProp_SLProps
     from OCP.TopAbs import TopAbs_REVERSED
     from OCP.TopLoc import TopLoc_Location

@@ -12,7 +12,7 @@ from edgel.synth.rays import RayTree, cast
 _JUMP = 2.0  # spacings: what a step in depth has beyond the slopes of both sides
 _BREAK = 1.0  # spacings: what is left of it between rays 1/256 of a pixel apart
 _HALVINGS = 8
-_STEEPEST = 20.0  # slope up to which a tangent plane is believed
+_STEEPEST = 20.0  # slope from which a face is so nearly edge-on that its plane explains any step
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +85,7 @@ def _slope(
     reach = np.einsum("ij,ij->i", normal[a], place - origins[b])
     with np.errstate(divide="ignore", invalid="ignore"):
         step = np.abs(reach / np.einsum("ij,ij->i", normal[a], directions[b]) - t[a]) * length
-    return np.where(step < _STEEPEST * apart, step, _STEEPEST * apart)
+    return np.where(step < _STEEPEST * apart, step, np.inf)
 
 
 def _narrow(
