@@ -366,3 +366,10 @@ def test_parts_of_the_cad_kernel_are_closed(tmp_path):
         turns = np.degrees(np.concatenate([crease.dihedral for crease in solid.creases]))
         assert turns.max() == pytest.approx(90)
         assert turns.min() > 40
+
+
+def test_a_part_says_how_to_install_its_maker(tmp_path):
+    parts = benchmark_module("parts")
+    vars(parts).update(CACHE=tmp_path, cad=None)
+    with pytest.raises(ImportError, match="pip install"):
+        parts.part("tee")
