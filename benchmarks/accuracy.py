@@ -13,6 +13,7 @@ from edgel.edges import EdgeKind
 from edgel.synth import Scene
 
 TOLERANCES = (0.5, 1.0, 1.5, 2.5)  # in spacings
+FAR = 2.5  # spacings: what is found farther from every true edge is false
 MIN_TURN = np.radians(25.0)  # a crease that turns less is neither asked for nor held against anyone
 ANGLE_BINS = tuple(range(0, 181, 20))  # degrees of turn
 ALL = EdgeKind.BOUNDARY | EdgeKind.OCCLUDING | EdgeKind.OCCLUDED | EdgeKind.CREASE
@@ -44,22 +45,24 @@ def score(scene: Scene, mask: np.ndarray, kind: np.ndarray, finds: EdgeKind) -> 
     """
     finite = np.isfinite(scene.cloud.xyz).all(axis=1)
     rows = np.flatnonzero(mask)
-    negative = not np.any(scene.point_kind)
     row: dict[str, Any] = {"points": int(finite.sum()), "found": len(rows)}
     labels = metrics.score_labels(mask[finite], scene.point_kind[finite] != 0)
     row["zero"] = {name: getattr(labels, name) for name in ("precision", "recall", "f1", "mcc", "iou")}
-    row["false_per_thousand"] = labels.false_per_thousand if negative else None
-    if negative:
+    away = _distance(scene.noise_free[rows], scene.edges.positions, scene.outlier[rows]) > FAR * scene.spacing
+    row["false_per_thousand"] = 1000 * int(away.sum()) / row["points"]
+    if len(target(scene, ALL).strong) == 0:
         return row
     row["all"] = _matched(scene, rows, target(scene, ALL))
     own = ALL & finds
-    row["own"] = row["all"] if own == ALL else _matched(scene, rows, target(scene, own))
+    asked = target(scene, own)
+    row["own"] = _matched(scene, rows, asked) if len(asked.strong) else None  # a closed surface has no boundary
     strong = target(scene, ALL).strong
     found = scene.cloud.xyz[rows]
     apart = metrics.distances(found, strong)
     row["chamfer"], row["hausdorff"], row["mean_hausdorff"] = (
         value / scene.spacing for value in (apart.chamfer, apart.hausdorff, apart.mean_hausdorff)
     )
+    row["position"] = position_error(scene, rows)
     row["kinds_right"] = kinds_right(scene, mask, kind)
     row["by_angle"] = by_angle(scene, rows)
     return row
@@ -67,8 +70,7 @@ def score(scene: Scene, mask: np.ndarray, kind: np.ndarray, finds: EdgeKind) -> 
 
 def _matched(scene: Scene, rows: np.ndarray, truth: Target) -> dict[str, float]:
     """Precision, recall and F1 at each tolerance; predictions that only a weak edge explains are left out."""
-    placed = scene.noise_free[rows]
-    outlier = ~np.isfinite(placed).all(axis=1)
+    placed, outlier = scene.noise_free[rows], scene.outlier[rows]
     to_strong, to_weak = (_distance(placed, those, outlier) for those in (truth.strong, truth.weak))
     back = _distance(truth.strong, placed[~outlier], np.zeros(len(truth.strong), bool))
     figures = {}
@@ -93,6 +95,17 @@ def _distance(positions: np.ndarray, among: np.ndarray, never: np.ndarray) -> np
     return result
 
 
+def position_error(scene: Scene, rows: np.ndarray) -> dict[str, float] | None:
+    """Distance, in spacings, of the found points as measured (noise and all) from the nearest true edge they found."""
+    strong = target(scene, ALL).strong
+    apart = _distance(scene.cloud.xyz[rows], strong, scene.outlier[rows]) / scene.spacing
+    near = apart[apart <= FAR]
+    if len(near) == 0:
+        return None
+    errors = metrics.spread(near)
+    return {"median": errors.median, "p95": errors.p95}
+
+
 def kinds_right(scene: Scene, mask: np.ndarray, kind: np.ndarray) -> float | None:
     """Share of the found true edge points that are called a kind they are; None where no kinds are told apart."""
     told = mask & (scene.point_kind != 0) & ((kind & int(ALL)) > 0)
@@ -107,8 +120,7 @@ def by_angle(scene: Scene, rows: np.ndarray, tolerance: float = 1.0) -> dict[str
     A found point belongs to the bin of the nearest true edge, right or wrong; those nearest to another kind are left out.
     """
     edges = scene.edges
-    placed = scene.noise_free[rows]
-    placed = placed[np.isfinite(placed).all(axis=1)]
+    placed = scene.noise_free[rows[~scene.outlier[rows]]]
     crease = edges.kind == int(EdgeKind.CREASE)
     bins = np.clip(np.digitize(np.degrees(np.nan_to_num(edges.dihedral)), ANGLE_BINS) - 1, 0, len(ANGLE_BINS) - 2)
     bins = np.where(crease, bins, -1)
@@ -129,7 +141,7 @@ def by_angle(scene: Scene, rows: np.ndarray, tolerance: float = 1.0) -> dict[str
 def best_of_grid(rival: Any, scenes: Iterable[Scene]) -> tuple[Mapping[str, Any], list[dict[str, Any]]]:
     """Choose a rival's parameters by the mean F1 at 2.5 spacings (of the kinds it claims to find) over scenes apart.
 
-    On negatives, where F1 says nothing, one minus the share of points called edges stands in for it.
+    Where there is nothing to find, one minus the share of points called edges stands in for it.
     """
     scenes = list(scenes)
     tried = []
@@ -138,6 +150,6 @@ def best_of_grid(rival: Any, scenes: Iterable[Scene]) -> tuple[Mapping[str, Any]
         for scene in scenes:
             found = rival.run(scene.cloud, scene.spacing, parameters)
             row = score(scene, found.mask, found.kind, rival.finds)
-            goods.append(row["own"]["f1@2.5"] if "own" in row else 1 - row["found"] / row["points"])
+            goods.append(row["own"]["f1@2.5"] if row.get("own") else 1 - row["found"] / row["points"])
         tried.append({"parameters": dict(parameters), "mean": float(np.mean(goods))})
     return max(tried, key=lambda one: one["mean"])["parameters"], tried
