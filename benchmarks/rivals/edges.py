@@ -6,6 +6,7 @@ import importlib.util
 import math
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -101,26 +102,36 @@ def _surface_variation(cloud: edgel.Cloud, spacing: float, parameters: Mapping) 
     return found(spread(rows, edge, len(cloud)), EdgeKind.CREASE, time.perf_counter() - begin)
 
 
-def _edgel(preset: str) -> Callable[[edgel.Cloud, float, Mapping], Found]:
-    def run(cloud: edgel.Cloud, spacing: float, parameters: Mapping) -> Found:
-        detect = edgel.detect if preset == "default" else edgel.paper.detect
-        begin = time.perf_counter()
-        edges = detect(cloud, **parameters)
-        seconds = time.perf_counter() - begin
-        kind = np.zeros(len(cloud), np.uint8)
-        kind[edges.index] = edges.kind
-        normals = np.full((len(cloud), 3), np.nan)
-        normals[edges.index] = edges.normals
-        return Found(kind != 0, kind, seconds, normals)
-
-    return run
+def _edgel_paper(cloud: edgel.Cloud, spacing: float, parameters: Mapping) -> Found:
+    # The method looks down along Z: a view is turned so that its sensor is above.
+    if cloud.shape is not None:
+        pose = sensor.locate(cloud, spacing)
+        cloud = edgel.Cloud((cloud.xyz - pose.origin) @ (pose.axes * [[1], [-1], [-1]]).T)
+    begin = time.perf_counter()
+    edges = edgel.paper.detect(cloud, **parameters)
+    return _from_edges(edges, time.perf_counter() - begin)
 
 
-def _module(name: str) -> Callable[[], str | None]:
+def _edgel_default(cloud: edgel.Cloud, spacing: float, parameters: Mapping) -> Found:
+    begin = time.perf_counter()
+    edges = edgel.detect(cloud, **parameters)
+    found = _from_edges(edges, time.perf_counter() - begin)
+    normals = np.full((len(cloud), 3), np.nan)
+    normals[edges.index] = edges.normals
+    return replace(found, normals=normals)
+
+
+def _from_edges(edges: edgel.Edges, seconds: float) -> Found:
+    kind = np.zeros(edges.num_points, np.uint8)
+    kind[edges.index] = edges.kind
+    return Found(kind != 0, kind, seconds)
+
+
+def module_missing(name: str) -> Callable[[], str | None]:
     return lambda: None if importlib.util.find_spec(name) else f"{name} is not installed: pip install {name}"
 
 
-def _program(name: str) -> Callable[[], str | None]:
+def program_missing(name: str) -> Callable[[], str | None]:
     return lambda: programs.missing(name)
 
 
@@ -149,21 +160,22 @@ RIVALS = (
             *(
                 {"smoothing": size, "method": method, "depth_step": step, "low": low, "high": high}
                 for size, method, step, low, high in (
-                    (10.0, "covariance", 5.0, 0.4, 1.1),
-                    (10.0, "covariance", 5.0, 0.8, 1.6),
-                    (10.0, "gradient", 10.0, 0.8, 1.6),
-                    (5.0, "covariance", 2.5, 0.4, 1.1),
+                    (3.0, "covariance", 5.0, 0.4, 1.1),
+                    (3.0, "covariance", 10.0, 0.4, 1.1),
+                    (3.0, "covariance", 10.0, 0.2, 0.5),
+                    (3.0, "covariance", 20.0, 0.2, 0.5),
+                    (3.0, "gradient", 10.0, 0.2, 0.5),
+                    (3.0, "gradient", 10.0, 0.8, 1.6),
                     (5.0, "covariance", 5.0, 0.4, 1.1),
-                    (5.0, "covariance", 5.0, 0.8, 1.6),
-                    (5.0, "gradient", 5.0, 0.4, 1.1),
-                    (5.0, "gradient", 2.5, 0.8, 1.6),
-                    (5.0, "gradient", 5.0, 0.8, 1.6),
+                    (5.0, "gradient", 10.0, 0.2, 0.5),
+                    (5.0, "gradient", 10.0, 0.4, 1.1),
                     (5.0, "gradient", 10.0, 0.8, 1.6),
-                    (3.0, "gradient", 5.0, 0.8, 1.6),
+                    (5.0, "gradient", 20.0, 0.4, 1.1),
+                    (10.0, "covariance", 10.0, 0.2, 0.5),
                 )
             ),
         ),
-        missing=_program("pcl_organized"),
+        missing=program_missing("pcl_organized"),
         run=_pcl_organized,
     ),
     Rival(
@@ -175,7 +187,7 @@ RIVALS = (
             _PCL_BOUNDARY,
             *({"radius": r, "normal_radius": r, "angle": a} for r in (2.5, 3.5, 5.0) for a in (90.0, 110.0, 130.0)),
         ),
-        missing=_program("pcl_boundary"),
+        missing=program_missing("pcl_boundary"),
         run=_pcl_boundary,
     ),
     Rival(
@@ -187,12 +199,12 @@ RIVALS = (
             _CGAL_VCM,
             *(
                 {"offset_radius": R, "convolution_radius": r, "threshold": t}
-                for R, r in ((3.0, 1.5), (5.0, 1.5), (5.0, 3.0))
+                for R, r in ((3.0, 1.5), (5.0, 1.5), (5.0, 3.0), (8.0, 5.0))
                 for t in (0.1, 0.16, 0.22)
                 if (R, r, t) != (3.0, 1.5, 0.16)
             ),
         ),
-        missing=_program("cgal_vcm"),
+        missing=program_missing("cgal_vcm"),
         run=_cgal_vcm,
     ),
     Rival(
@@ -209,7 +221,7 @@ RIVALS = (
                 if (r, a) != (3.4, 90.0)
             ),
         ),
-        missing=_module("open3d"),
+        missing=module_missing("open3d"),
         run=_open3d_boundary,
     ),
     Rival(
@@ -219,11 +231,19 @@ RIVALS = (
         defaults=_SURFACE_VARIATION,
         grid=grid(
             _SURFACE_VARIATION,
-            *({"k": k, "threshold": t} for k in (10, 16, 30) for t in (0.02, 0.04, 0.08)),
-            {"threshold": 0.06},
-            {"threshold": 0.1},
+            *(
+                {"k": k, "threshold": t}
+                for k, thresholds in (
+                    (10, (0.02, 0.04)),
+                    (16, (0.02, 0.04, 0.08)),
+                    (30, (0.03, 0.06)),
+                    (50, (0.06, 0.1, 0.15)),
+                    (100, (0.06, 0.1)),
+                )
+                for t in thresholds
+            ),
         ),
-        missing=_module("pgeof"),
+        missing=module_missing("pgeof"),
         run=_surface_variation,
     ),
     Rival(
@@ -233,7 +253,7 @@ RIVALS = (
         defaults={},
         grid=(),
         missing=lambda: None,
-        run=_edgel("paper"),
+        run=_edgel_paper,
     ),
     Rival(
         name="edgel default",
@@ -242,6 +262,6 @@ RIVALS = (
         defaults={},
         grid=(),
         missing=lambda: None,
-        run=_edgel("default"),
+        run=_edgel_default,
     ),
 )

@@ -9,7 +9,7 @@ import numpy as np
 import edgel
 
 from . import programs
-from .edges import _module, _program
+from .edges import module_missing, program_missing
 from .interface import THREADS, NormalsRival
 
 
@@ -60,8 +60,8 @@ def _scipy(points: np.ndarray, k: int) -> tuple[np.ndarray, float]:
 
 NORMALS = (
     NormalsRival("edgel", lambda: None, _edgel),
-    NormalsRival("Open3D", _module("open3d"), _open3d),
-    NormalsRival("small_gicp", _module("small_gicp"), _small_gicp),
-    NormalsRival("PCL OMP", _program("pcl_normals"), _pcl),
-    NormalsRival("scipy", _module("scipy"), _scipy),
+    NormalsRival("Open3D", module_missing("open3d"), _open3d),
+    NormalsRival("small_gicp", module_missing("small_gicp"), _small_gicp),
+    NormalsRival("PCL OMP", program_missing("pcl_normals"), _pcl),
+    NormalsRival("scipy", module_missing("scipy"), _scipy),
 )
