@@ -147,7 +147,7 @@ _PCL_ORGANIZED = {
 _PCL_BOUNDARY = {"radius": 10.5, "normal_radius": 10.5, "angle": 90.0}
 _CGAL_VCM = {"offset_radius": 3.0, "convolution_radius": 1.5, "threshold": 0.16}
 _OPEN3D_BOUNDARY = {"radius": 3.4, "max_nn": 30, "angle": 90.0}
-_SURFACE_VARIATION = {"k": 50, "threshold": 0.03}
+_SURFACE_VARIATION = {"k": 51, "threshold": 0.03}  # 50 and the point itself
 
 RIVALS = (
     Rival(
@@ -237,7 +237,7 @@ RIVALS = (
                     (10, (0.02, 0.04)),
                     (16, (0.02, 0.04, 0.08)),
                     (30, (0.03, 0.06)),
-                    (50, (0.06, 0.1, 0.15)),
+                    (51, (0.06, 0.1, 0.15)),
                     (100, (0.06, 0.1)),
                 )
                 for t in thresholds
