@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -138,7 +138,9 @@ def by_angle(scene: Scene, rows: np.ndarray, tolerance: float = 1.0) -> dict[str
     return {"hits": counts(which[hit]), "found": counts(which), "reached": counts(bins[back]), "true": counts(bins)}
 
 
-def best_of_grid(rival: Any, scenes: Iterable[Scene]) -> tuple[Mapping[str, Any], list[dict[str, Any]]]:
+def best_of_grid(
+    rival: Any, scenes: Iterable[Scene], answer: Callable[[Any, Scene, Mapping[str, Any]], Any]
+) -> tuple[Mapping[str, Any], list[dict[str, Any]]]:
     """Choose a rival's parameters by the mean F1 at 2.5 spacings (of the kinds it claims to find) over scenes apart.
 
     Where there is nothing to find, one minus the share of points called edges stands in for it.
@@ -148,7 +150,7 @@ def best_of_grid(rival: Any, scenes: Iterable[Scene]) -> tuple[Mapping[str, Any]
     for parameters in (rival.defaults, *rival.grid):
         goods = []
         for scene in scenes:
-            found = rival.run(scene.cloud, scene.spacing, parameters)
+            found = answer(rival, scene, parameters)
             row = score(scene, found.mask, found.kind, rival.finds)
             goods.append(row["own"]["f1@2.5"] if row.get("own") else 1 - row["found"] / row["points"])
         tried.append({"parameters": dict(parameters), "mean": float(np.mean(goods))})

@@ -26,6 +26,7 @@ import published
 import report
 import scenes
 import speed
+from answers import answer
 from rivals import RIVALS, Rival
 
 HERE = Path(__file__).parent
@@ -64,11 +65,20 @@ def main() -> None:
         HERE / "results" / f"{results['machine']['date']}-{results['machine']['commit']}{'-quick' * options.quick}.json"
     )
     path.parent.mkdir(exist_ok=True)
-    path.write_text(json.dumps(results, indent=None, default=float))
+    path.write_text(json.dumps(rounded(results), default=float) + "\n")
     print(f"{path}: the results, after {results['minutes']:.1f} minutes")
     if not options.quick:
         print(f"{report.write(results)}: the tables and plots")
     print(report.summary(results))
+
+
+def rounded(value: Any) -> Any:
+    """Round every float to six digits: results are kept in the repository."""
+    if isinstance(value, dict):
+        return {key: rounded(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [rounded(each) for each in value]
+    return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
 def machine() -> dict[str, Any]:
@@ -123,7 +133,7 @@ def _tune_one(job: tuple[str, str, list[str]]) -> Any:
     name, _, names = job
     rival = next(r for r in RIVALS if r.name == name)
     fitting = [scene for scene in map(scenes.load, names) if scene.cloud.is_organized or not rival.organized_only]
-    return accuracy.best_of_grid(rival, fitting)
+    return accuracy.best_of_grid(rival, fitting, answer)
 
 
 def tunable(rival: Rival) -> bool:
@@ -163,7 +173,7 @@ def _scene_rows(job: tuple[str, dict[str, dict[str, Any]]]) -> list[dict[str, An
         best = tuned.get(rival.name, {}).get(noise_of(name))
         variants = {"defaults": rival.defaults} | ({"tuned": best["best"]} if best else {})
         for variant, parameters in variants.items():
-            found = rival.run(scene.cloud, scene.spacing, parameters)
+            found = answer(rival, scene, parameters)
             shape, view, noise, outliers = name.split("/")
             rows.append(
                 {

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import scenes
+from answers import answer
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
@@ -31,7 +32,7 @@ def answers(scene: Scene, tuned: dict[str, dict[str, dict]]) -> list[tuple[str, 
         if rival.missing() is not None or (rival.organized_only and not scene.cloud.is_organized):
             continue
         best = tuned.get(rival.name, {}).get(scene.name.split("/")[2])
-        found.append((rival.name, rival.run(scene.cloud, scene.spacing, best["best"] if best else rival.defaults).mask))
+        found.append((rival.name, answer(rival, scene, best["best"] if best else rival.defaults).mask))
     return found
 
 

@@ -12,6 +12,7 @@ import published
 from accuracy import ANGLE_BINS, TOLERANCES
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from rivals import RIVALS
 from scenes import LADDER, NEGATIVES
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -104,9 +105,25 @@ def _page(results: dict[str, Any], rows: list[Row]) -> Iterable[str]:
         yield "Stages of both presets at 647,984 points."
         table = [[s["preset"], s["stage"], f"{s['seconds']:.4f}"] for s in results["stages"]]
         yield _table(["preset", "stage", "s"], table)
+    yield "## Parameters\n\nLengths in spacings, angles in degrees; *tuned* for each level of noise. Every grid entry tried and its mean is in `benchmarks/tuned.json`."
+    yield _parameters(results["tuning"])
     pictures = DOCS / "benchmarks" / "pictures.md"
     if pictures.exists():
         yield pictures.read_text().strip()
+
+
+def _parameters(tuning: dict[str, Any]) -> str:
+    def text(parameters: Any) -> str:
+        return ", ".join(
+            f"{key} {value:g}" if isinstance(value, float) else f"{key} {value}" for key, value in parameters.items()
+        )
+
+    lines = []
+    for rival in RIVALS:
+        if rival.grid:
+            lines.append([rival.name, "defaults", text(rival.defaults)])
+            lines += [[rival.name, noise, text(one["best"])] for noise, one in tuning.get(rival.name, {}).items()]
+    return _table(["rival", "noise", "parameters"], lines)
 
 
 def _methods(rows: Sequence[Row]) -> list[tuple[str, str]]:
