@@ -14,7 +14,7 @@ from edgel import synth
 from edgel.kdtree import build_index
 
 ROUNDS = 5
-SLOWEST = 20.0  # seconds: what took longer at one size is not tried at the next
+SLOWEST = 20.0  # seconds: what would take longer at the next size, growing with the points, is not tried there
 
 
 def clouds(sizes: Sequence[int]) -> dict[int, np.ndarray]:
@@ -42,31 +42,28 @@ def timed(function: Callable[[], Any]) -> Callable[[], float]:
     return once
 
 
-def normals_of_all_points(sizes: Sequence[int], k: int = 16) -> list[dict[str, Any]]:
+def normals_of_all_points(sizes: Sequence[int], k: int = 16, slowest: float = SLOWEST) -> list[dict[str, Any]]:
     """All-point normals, the building of whatever index included."""
-    rows, too_slow = [], set()
-    for size, points in clouds(sizes).items():
-        work = {
-            rival.name: (lambda rival=rival, points=points: rival.run(points, k)[1])
-            for rival in NORMALS
-            if rival.missing() is None and rival.name not in too_slow
-        }
-        rows += _rows("normals of all points", size, interleaved(work), too_slow)
-    return rows
+
+    def work(points: np.ndarray) -> dict[str, Callable[[], float]]:
+        return {rival.name: lambda rival=rival: rival.run(points, k)[1] for rival in NORMALS if rival.missing() is None}
+
+    return _over_sizes("normals of all points", sizes, work, slowest)
 
 
-def edges(sizes: Sequence[int]) -> list[dict[str, Any]]:
+def edges(sizes: Sequence[int], slowest: float = SLOWEST) -> list[dict[str, Any]]:
     """Edge detection of the tee, each method with its defaults; methods for organized clouds can't take it."""
-    rows, too_slow = [], set()
-    for size, points in clouds(sizes).items():
+
+    def work(points: np.ndarray) -> dict[str, Callable[[], float]]:
         cloud = edgel.Cloud(points)
-        spacing = float(np.sqrt(np.prod(np.ptp(points[:, :2], axis=0)) / size))
-        work: dict[str, Callable[[], float]] = {"k-d tree of edgel": timed(lambda points=points: build_index(points))}
+        spacing = float(np.sqrt(np.prod(np.ptp(points[:, :2], axis=0)) / len(points)))
+        pieces: dict[str, Callable[[], float]] = {"k-d tree of edgel": timed(lambda: build_index(points))}
         for rival in RIVALS:
-            if rival.missing() is None and not rival.organized_only and rival.name not in too_slow:
-                work[rival.name] = lambda rival=rival, c=cloud, s=spacing: rival.run(c, s, rival.defaults).seconds
-        rows += _rows("edges", size, interleaved(work), too_slow)
-    return rows
+            if rival.missing() is None and not rival.organized_only:
+                pieces[rival.name] = lambda rival=rival: rival.run(cloud, spacing, rival.defaults).seconds
+        return pieces
+
+    return _over_sizes("edges", sizes, work, slowest)
 
 
 def stages(rounds: int = ROUNDS) -> list[dict[str, Any]]:
@@ -83,12 +80,22 @@ def stages(rounds: int = ROUNDS) -> list[dict[str, Any]]:
     return rows
 
 
-def _rows(work: str, size: int, seconds: dict[str, list[float]], too_slow: set[str]) -> list[dict[str, Any]]:
-    rows = []
-    for name, each in seconds.items():
-        median = float(np.median(each))
-        rows.append({"work": work, "method": name, "points": size, "seconds": median, "rounds": each})
-        print(f"  {work}, {size:,} points, {name}: {median:.3f} s", flush=True)
-        if median > SLOWEST:
-            too_slow.add(name)
+def _over_sizes(
+    title: str,
+    sizes: Sequence[int],
+    work: Callable[[np.ndarray], dict[str, Callable[[], float]]],
+    slowest: float,
+) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = []
+    expected: dict[str, float] = {}
+    before = 0
+    for size, points in clouds(sizes).items():
+        growth = size / before if before else 0.0
+        pieces = {name: piece for name, piece in work(points).items() if expected.get(name, 0.0) * growth <= slowest}
+        for name, each in interleaved(pieces).items():
+            expected[name] = float(np.median(each))
+            rows.append({"work": title, "method": name, "points": size, "seconds": expected[name], "rounds": each})
+            print(f"  {title}, {size:,} points, {name}: {expected[name]:.3f} s", flush=True)
+        expected = {name: seconds if name in pieces else float("inf") for name, seconds in expected.items()}
+        before = size
     return rows

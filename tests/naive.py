@@ -146,3 +146,81 @@ def plane(neighbours):
     normal = vt[2]
     distances = neighbours @ normal - centre @ normal
     return normal, normal @ centre, (distances**2).sum(), s
+
+
+def planes_near(normals, planarity, points, distances, spacing, min_angle):
+    """Crease test 1 at the origin: angle between the two planes, 0 without a crease."""
+    score = planarity * np.exp(-((distances / (3 * spacing)) ** 2))
+    a = int(np.argmax(score))
+    cosines = np.abs(normals @ normals[a])
+    score = planarity * (1 - cosines) * np.exp(-((distances / (4 * spacing)) ** 2))
+    b = int(np.argmax(score))
+    off = max(abs(points[a] @ normals[a]), abs(points[b] @ normals[b]))
+    angle = math.acos(min(cosines[b], 1))
+    return angle if angle > min_angle and planarity[b] >= 0.3 and off < 0.35 * spacing else 0.0
+
+
+def planes_through(points, spacing, min_angle):
+    """Crease test 2 at the origin; the first of the points (nearest first) is the origin itself."""
+    tolerance = 0.15 * spacing
+
+    def best(rest, other):
+        winner, support = None, 0.0
+        for i in range(1, min(11, len(points))):
+            for j in range(i + 1, min(11, len(points))):
+                normal = np.cross(points[i], points[j])
+                area = np.linalg.norm(normal)
+                if area < 0.3 * spacing**2:
+                    continue
+                normal = normal / area
+                if other is not None and abs(normal @ other) > math.cos(min_angle):
+                    continue
+                off = np.abs(rest @ normal)
+                weight = (1 - 0.5 * off[off < tolerance] / tolerance).sum()
+                if weight > support + 1e-12:
+                    winner, support = normal, weight
+        return winner, support
+
+    a, _ = best(points[1:], None)
+    if a is None:
+        return 0.0
+    b, support = best(points[1:][np.abs(points[1:] @ a) >= tolerance], a)
+    if b is None or support < 4:
+        return 0.0
+    line = np.cross(a, b)
+    line = line / np.linalg.norm(line)
+    balances = []
+    for plane in (a, b):
+        across = points[1:][np.abs(points[1:] @ plane) < tolerance] @ np.cross(plane, line)
+        sides = (across > 0.4 * spacing).sum(), (across < -0.4 * spacing).sum()
+        balances.append(min(sides) / max(*sides, 1))
+    return math.acos(min(abs(a @ b), 1)) if min(balances) < 0.15 else 0.0
+
+
+def hinge(points, spacing, u, v, normal):
+    """Crease test 3 at the origin, in the frame u, v, normal: the turn of the hinge, 0 without a crease."""
+    radius = np.linalg.norm(points[-1]) * 1.0001
+    x, y, z = points @ u / radius, points @ v / radius, points @ normal / radius
+    weight = np.sqrt(1 - 0.8 * (points**2).sum(axis=1) / radius**2)
+
+    def fit(columns):
+        # A little is added to the diagonal of the normal equations: as many more rows of the least squares.
+        design = np.r_[np.column_stack(columns) * weight[:, None], 1e-3 * np.eye(len(columns))]
+        target = np.r_[z * weight, np.zeros(len(columns))]
+        solution = np.linalg.lstsq(design, target, rcond=None)[0]
+        # The squares that are left, less what the solution itself was charged for.
+        return ((design @ solution - target) ** 2).sum(), solution
+
+    one = np.ones_like(x)
+    smooth, _ = fit([one, x, y, x * x, x * y, y * y])
+    best = (math.inf, 0.0, 0.0)
+    for i in range(12):
+        c, s = math.cos(math.pi * i / 12), math.sin(math.pi * i / 12)
+        t, w = c * x + s * y, c * y - s * x
+        for j in range(13):
+            o = (j - 6) * 0.9 / 12
+            left, f = fit([one, t, w, np.abs(t - o)])
+            if left < best[0] - 1e-15:
+                best = (left, abs(math.atan(f[1] + f[3]) - math.atan(f[1] - f[3])), o)
+    left, angle, o = best
+    return angle if angle > math.radians(30) and abs(o) * radius < 0.35 * spacing and left < smooth else 0.0

@@ -88,7 +88,7 @@ def detect(
     if planes.num_undefined == len(planes):
         raise ValueError("points: all lie on one line or spot, so there is no surface whose edges could be found")
     with stages("creases"):
-        angles = crease_angles(index, MIN_CREASE_ANGLE)
+        angles = crease_angles(index, checked.xyz, MIN_CREASE_ANGLE)
     with stages("boundaries"):
         gaps = boundary_gaps(index, planes.normals, MIN_BOUNDARY_GAP)
     kind = np.where(angles > 0, EdgeKind.CREASE, 0) | np.where(gaps > 0, EdgeKind.BOUNDARY, 0)
