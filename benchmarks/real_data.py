@@ -38,8 +38,8 @@ REMARKS = {
     "occlusions, with a sprinkle of false creases from noise. The paper finds the same outlines as bands, and with them "
     "every hole.",
     "truth": "Whole parts, sampled all round: the paper's single view from above can't see most edges and marks what "
-    "changes height. The default follows sharp creases (`abc_0134`, `abc_7023`), misses thin plates (`abc_7034`), and "
-    "finds nothing under noise (`abc_noise_*`): its neighbourhoods are of fixed size.",
+    "changes height. The default follows sharp creases, on thin plates too (`abc_7034`), but leaves gaps where several meet "
+    "(`abc_7010`), misses soft ones (`shrec_01`) and most under noise (`abc_noise_*`): its neighbourhoods are of fixed size.",
     "two_depth_sensors": "Ensenso: noise above a tenth of the spacing, so the default is speckled all over; outlines are "
     "there but drown. PrimeSense: depth steps show as rings. The paper marks the box only on its high side: the step "
     "on the other is below the threshold.",
