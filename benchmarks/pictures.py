@@ -47,7 +47,7 @@ def draw(scene: Scene, panels: list[tuple[str, np.ndarray]], path: Path) -> None
     figure.suptitle(f"{scene.name}: {np.isfinite(scene.cloud.xyz[:, 0]).sum():,} points")
     buffer = io.BytesIO()
     FigureCanvasAgg(figure).print_png(buffer)
-    Image.open(buffer).convert("RGB").quantize(64).save(path, optimize=True)
+    Image.open(buffer).convert("RGB").quantize(128).save(path, optimize=True)
 
 
 def main() -> None:

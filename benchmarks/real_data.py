@@ -23,8 +23,8 @@ REMARKS = {
     "airborne": "The default draws the border of the flat tile and the roof lines; tree crowns are speckled with false "
     "edges. The paper marks wide bands: at this density its pixels are metres wide. `interesting.las`, the COPC and the "
     "UTM file are a thousand points spread over a town, several spacings to the next house: nothing to find.",
-    "kinect_objects": "Depth quantised to steps of some millimetres: the default takes the steps on the table for creases "
-    "(the short dashes everywhere); the outlines of the boxes are there, their inner creases only in part. The paper "
+    "kinect_objects": "Depth quantised to steps of some millimetres: the default takes the steps on the table for creases and "
+    "is speckled all over; the outlines of the boxes are there, their inner creases only in part. The paper "
     "marks the outlines as wide bands and nothing inside.",
     "kinect_organized": "As above. `organized_edge_1` is a rendered, noise-free frame: there the default finds every "
     "outline, but breaks the long fold between wall and table into dashes. The paper finds the outlines only.",
@@ -32,10 +32,10 @@ REMARKS = {
     "pixel beside a ring is an edge. Both are useless here.",
     "roofs": "About a thousand points a roof. The default finds the eaves and parts of the ridges with much noise. "
     "The paper's image is 8 pixels wide.",
-    "scan_vs_mesh": "The scans (`.npy`) have noise of one spacing: the default finds next to nothing, the paper broad "
-    "bands at the silhouette. The meshes (`.ply`) are vertices of large triangles, no scans: nearly all are called edges.",
+    "scan_vs_mesh": "The scans (`.npy`) have noise of one spacing: what the default finds is scattered at random, the paper finds "
+    "broad bands at the silhouette. The meshes (`.ply`) are vertices of large triangles, no scans: nearly all are called edges.",
     "structured_light": "The paper's kind of sensor. The default follows the outlines of the parts in the bin and their "
-    "occlusions, with a sprinkle of false creases from noise. The paper finds the same outlines as bands, and with them "
+    "occlusions, with false creases from noise where the bin's walls are far and slanted. The paper finds the same outlines as bands, and with them "
     "every hole.",
     "truth": "Whole parts, sampled all round: the paper's single view from above can't see most edges and marks what "
     "changes height. The default follows sharp creases, on thin plates too (`abc_7034`), but leaves gaps where several meet "
