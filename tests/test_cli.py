@@ -1,5 +1,6 @@
 """The command line: what each command does, what its exit codes mean, and that bad input never shows a traceback."""
 
+import dataclasses
 import inspect
 import json
 import os
@@ -16,7 +17,7 @@ import edgel
 from edgel import io
 from edgel.cli import app
 from edgel.cli.convert import differences
-from edgel.cli.detect import arguments, detect
+from edgel.cli.detect import arguments, detect, summary
 from edgel.cli.output import print_json
 from edgel.cli.progress import COMPILING, Watch
 
@@ -100,6 +101,7 @@ def test_detect_writes_the_edge_points(scan, tmp_path):
     edges = io.read(tmp_path / "edges.ply")
     assert edges.attributes["label"].tolist() == found.index.tolist()
     assert {"edge_kind", "edge_strength", "nx", "ny", "nz"} < set(edges.attributes)
+    assert {"edge_angle", "edge_convex", "nz2", "tz", "edge_z"} < set(edges.attributes)
 
 
 def test_detect_all_keeps_every_point(scan, tmp_path):
@@ -137,6 +139,49 @@ def test_detect_json(scan, tmp_path):
     assert {"reading", "canny", "normals", "writing"} < set(found["seconds"])
     assert found["output"] == str(tmp_path / "edges.ply")
     assert {"input", "report", "preset", "normals_undefined", "peak_memory_bytes"} < set(found)
+    assert (found["method"], found["reason"]) == ("paper", "the published method looks along Z")
+    assert found["creases"] == {"median_angle_degrees": None, "convex": 0, "concave": 0}
+
+
+def test_detect_kinds_and_method(scan, tmp_path):
+    words = ("--kinds", "crease, Boundary", "--method", "surface")
+    result = run("detect", scan, "-o", tmp_path / "edges.npz", *words)
+    assert result.exit_code == 0
+    assert "surface" in result.stderr
+    assert "asked for" in result.stderr
+    expected = edgel.detect(io.read(scan), kinds=["crease", "boundary"])
+    assert np.array_equal(io.read(tmp_path / "edges.npz").attributes["label"], expected.index)
+    assert json.loads(run("detect", scan, "--kinds", "color", "--json").stdout)["edge_points"] == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--kinds", "sharp"), "--kinds: 'sharp' is unknown; choose from boundary, occluding"),
+        (("--kinds", ","), "--kinds: none is asked for"),
+        (("--method", "best"), "--method: 'best' is unknown; choose auto or surface"),
+        (("--kinds", "crease", *PAPER), "--kinds: not an option of the paper preset; add --preset default"),
+        (("--method", "surface", *PAPER), "--method: not an option of the paper preset; add --preset default"),
+    ],
+)
+def test_detect_names_wrong_kinds_and_methods(scan, words, message):
+    result = run("detect", scan, *words)
+    assert result.exit_code == 2
+    assert message in result.stderr
+
+
+def test_the_summary_tells_what_is_known_of_the_creases():
+    edges = edgel.detect(step())
+    angle = np.where(np.arange(len(edges)) % 2, np.pi / 2, np.nan)
+    convex = np.where(np.arange(len(edges)) % 2, 1, -1).astype(np.int8)
+    kind = np.full(len(edges), edgel.EdgeKind.CREASE, np.uint8)
+    rows = {
+        row[0].strip(): row for row in summary(dataclasses.replace(edges, kind=kind, angle=angle, convex=convex), {})
+    }
+    assert rows["crease"][2].startswith("median angle 90.0 degrees, ")
+    assert "convex" in rows["crease"][2]
+    assert "concave" in rows["crease"][2]
+    assert rows["method"] == ("method", "surface", edges.reason)
 
 
 def test_detect_report(scan, tmp_path):
@@ -156,9 +201,15 @@ def test_every_argument_of_the_detectors_is_an_option_and_its_default_is_shown()
     names = set(inspect.signature(detect).parameters)
     assert (arguments("default") | arguments("paper")) - {"progress"} <= names
     page = RUNNER.invoke(app, ["detect", "--help"]).stdout
-    for option, default in (("--sigma", "1.4"), ("--kernel-size", "5"), ("--num-neighbors", "16")):
-        line = next(line for line in page.splitlines() if option in line and "[default" in line)
-        assert f"[default: {default}]" in line
+    for option, default in (
+        ("--sigma", "1.4"),
+        ("--kernel-size", "5"),
+        ("--num-neighbors", "16"),
+        ("--method", "auto"),
+    ):
+        text = " ".join(page.replace("\N{BOX DRAWINGS LIGHT VERTICAL}", " ").split())
+        said = text[text.index(f" {option} ") :]
+        assert said[said.index("[default:") :].startswith(f"[default: {default}]")
 
 
 def test_normals_of_every_point(scan, tmp_path):

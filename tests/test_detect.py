@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 import edgel
 from edgel import EdgeKind
+from edgel.detect import DEFAULT_KINDS
 
 
 def box(spacing=0.02, seed=0):
@@ -22,6 +23,34 @@ def box(spacing=0.02, seed=0):
 def to_nearest_cube_edge(points):
     gap = np.sort(np.minimum(np.abs(points), np.abs(points - 1)), axis=1)
     return np.hypot(gap[:, 0], gap[:, 1])
+
+
+def assert_well_formed(found, points):
+    """What holds of every answer, whatever the detector."""
+    num = len(found)
+    shapes = {"index": (num,), "kind": (num,), "strength": (num,), "position": (num, 3), "direction": (num, 3)}
+    shapes |= {"normals": (num, 2, 3), "angle": (num,), "convex": (num,)}
+    types = {"index": np.int64, "kind": np.uint8, "convex": np.int8}
+    for name, shape in shapes.items():
+        values = getattr(found, name)
+        assert values.shape == shape, name
+        assert values.dtype == types.get(name, np.float64), name
+    assert (np.diff(found.index) > 0).all()
+    assert (found.kind > 0).all()
+    assert ((found.strength > 0) & (found.strength <= 1)).all()
+    assert np.isfinite(points.reshape(-1, 3)[found.index]).all()
+    assert np.isfinite(found.position).all()
+    for units in (found.direction, found.normals[:, 0], found.normals[:, 1]):
+        known = ~np.isnan(units).any(axis=1)
+        assert np.isnan(units[~known]).all()
+        np.testing.assert_allclose(np.linalg.norm(units[known], axis=1), 1)
+    two = ~np.isnan(found.normals[:, :, 0]).any(axis=1)
+    assert not np.isnan(found.normals[~np.isnan(found.normals[:, 1, 0]), 0]).any()
+    assert (two | np.isnan(found.angle)).all()
+    assert ((found.angle >= 0) & (found.angle <= np.pi) | np.isnan(found.angle)).all()
+    assert np.isin(found.convex, (-1, 0, 1)).all()
+    assert found.num_without_normal == np.isnan(found.normals[:, 0]).any(axis=1).sum()
+    assert found.method in {"surface", "organized", "orthographic", "pinhole", "spherical", "paper"}
 
 
 def test_the_creases_of_a_cube_are_found():
@@ -95,10 +124,12 @@ def test_the_answer_is_well_formed():
     assert np.isfinite(points[found.index]).all()
     assert ((found.strength > 0) & (found.strength <= 1)).all()
     assert found.num_dropped == 1
-    np.testing.assert_allclose(np.linalg.norm(found.normals, axis=1), 1)
-    assert ((([0.5, 0.5, 9] - points[found.index]) * found.normals).sum(axis=1) >= 0).all()
+    first = found.normals[:, 0]
+    np.testing.assert_allclose(np.linalg.norm(first, axis=1), 1)
+    assert ((([0.5, 0.5, 9] - points[found.index]) * first).sum(axis=1) >= 0).all()
     everywhere = edgel.estimate_normals(points, viewpoint=[0.5, 0.5, 9])
-    np.testing.assert_array_equal(found.normals, everywhere.normals[found.index])
+    np.testing.assert_array_equal(first, everywhere.normals[found.index])
+    assert_well_formed(found, points)
 
 
 @pytest.mark.parametrize(
@@ -124,7 +155,47 @@ def test_three_points_and_repeats_are_answered():
     assert found.num_points == len(points)
 
 
-@pytest.mark.parametrize("options", [{"preset": "best"}, {"preset": "paper", "viewpoint": [0, 0, 1]}])
-def test_wrong_options_are_named(options):
-    with pytest.raises(ValueError, match="preset"):
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"preset": "best"}, "preset"),
+        ({"preset": "paper", "viewpoint": [0, 0, 1]}, "viewpoint.*preset"),
+        ({"preset": "paper", "kinds": "crease"}, "kinds: the paper.*preset"),
+        ({"preset": "paper", "method": "surface"}, "method: the paper.*preset"),
+        ({"method": "best"}, "method: expected one of auto"),
+        ({"kinds": "sharp"}, "kinds: 'sharp' is unknown; choose from boundary"),
+        ({"kinds": ["crease", "image"]}, "kinds: 'image' is unknown"),
+        ({"kinds": EdgeKind.IMAGE}, "kinds: expected some of boundary"),
+        ({"kinds": []}, "kinds: none is asked for"),
+    ],
+)
+def test_wrong_options_are_named(options, message):
+    with pytest.raises(ValueError, match=message):
         edgel.detect(box(0.1), **options)
+
+
+def test_names_of_kinds_are_names():
+    with pytest.raises(TypeError, match="kinds: expected EdgeKind flags or names"):
+        edgel.detect(box(0.1), kinds=[8])  # pyright: ignore[reportArgumentType]
+
+
+def test_the_published_method_takes_the_defaults_of_the_options_it_has_not():
+    found = edgel.detect(box(0.1), preset="paper", kinds=DEFAULT_KINDS, method="auto")
+    assert found.method == "paper"
+
+
+def test_only_the_kinds_asked_for_are_answered():
+    points = box()[: 2 * len(box()) // 3]  # cut open: it has a boundary too
+    every = edgel.detect(points)
+    assert every.method == "surface"
+    assert every.reason
+    assert sum(every.count_kinds().values()) >= len(every)
+    for kind in (EdgeKind.BOUNDARY, EdgeKind.CREASE):
+        name = str(kind.name).lower()
+        found = edgel.detect(points, kinds=kind)
+        of_kind = (every.kind & kind) > 0
+        assert found.count_kinds() == {name: of_kind.sum()}
+        np.testing.assert_array_equal(found.index, every.index[of_kind])
+        np.testing.assert_array_equal(edgel.detect(points, kinds=[name.upper()]).index, found.index)
+        assert_well_formed(found, points)
+    assert len(edgel.detect(points, kinds="color")) == 0

@@ -111,10 +111,13 @@ def test_the_share_does_not_depend_on_the_density(scan, share):
 def test_normals_of_the_edges_are_those_of_the_surface(scan):
     found = paper.detect(scan.cloud)
     everywhere = by_offset(edgel.estimate_normals(scan.cloud))
-    np.testing.assert_array_equal(found.normals, everywhere.normals[found.index])
+    np.testing.assert_array_equal(found.normals[:, 0], everywhere.normals[found.index])
+    np.testing.assert_array_equal(found.planes.normals, found.normals[:, 0])
+    assert np.isnan(found.normals[:, 1]).all()
+    np.testing.assert_array_equal(found.position, scan.cloud.xyz[found.index])
     np.testing.assert_array_equal(found.planes.offset, everywhere.offset[found.index])
     assert (found.planes.offset > 0).all()
-    error = np.degrees(np.arccos(np.clip(np.abs((found.normals * scan.normals[found.index]).sum(axis=1)), 0, 1)))
+    error = np.degrees(np.arccos(np.clip(np.abs((found.planes.normals * scan.normals[found.index]).sum(axis=1)), 0, 1)))
     assert np.median(error) < 5
 
 
@@ -191,7 +194,7 @@ def test_utm_coordinates_keep_their_millimetres():
     found = paper.detect(local + [500_000, 5_000_000, 300], width=100)
     assert len(np.setxor1d(expected.index, found.index)) < 0.01 * len(expected)
     both, a, b = np.intersect1d(expected.index, found.index, return_indices=True)
-    turn = np.abs((expected.normals[a] * found.normals[b]).sum(axis=1))
+    turn = np.abs((expected.planes.normals[a] * found.planes.normals[b]).sum(axis=1))
     assert len(both) > 100
     assert turn.min() > 1 - 1e-9
 
@@ -247,7 +250,7 @@ def test_a_diagonal_line_has_edges_but_no_normals():
     t = np.linspace(0, 1, 500)
     found = paper.detect(np.c_[t, t, t])
     assert len(found) > 0
-    assert found.planes.num_undefined == len(found)
+    assert found.num_without_normal == found.planes.num_undefined == len(found)
 
 
 def test_stages_are_timed_and_told():
@@ -269,5 +272,5 @@ def test_edge_points_keep_every_attribute():
     assert ((only.attributes["edge_strength"] > 0) & (only.attributes["edge_strength"] <= 1)).all()
     labelled = found.label(cloud)
     np.testing.assert_array_equal(np.flatnonzero(labelled.attributes["edge_kind"]), found.index)
-    np.testing.assert_allclose(labelled.attributes["nx"][found.index], found.normals[:, 0], atol=1e-7)
+    np.testing.assert_allclose(labelled.attributes["nx"][found.index], found.normals[:, 0, 0], atol=1e-7)
     assert np.isnan(np.delete(labelled.attributes["nx"], found.index)).all()

@@ -11,10 +11,11 @@ import pytest
 from PIL import Image
 
 import edgel
-from edgel import Cloud, EdgeKind, Edges, Normals, figures, paper, synth
+from edgel import Cloud, EdgeKind, Edges, figures, paper, synth
 from edgel.demo import Measurement, Times, run_demo, side_by_side
 from edgel.demo.tables import CLAIM, PUBLISHED, findings
 from edgel.demo.truth import FoundLength, Offsets, found_lengths, offsets
+from edgel.edges import one_face
 from edgel.report import Case, Table, write_report
 from edgel.report.tables import count_table, machine_table, parameter_table, time_table
 
@@ -58,16 +59,17 @@ def by_hand(cloud, rows, kind=EdgeKind.CREASE):
     """Edges of the default preset as a detector would answer them, with one normal missing."""
     normals = np.tile([0.0, 0.0, 1.0], (len(rows), 1))
     normals[:1] = np.nan
-    offset = np.zeros(len(rows))
-    offset[:1] = np.nan
     return Edges(
         index=np.asarray(rows, np.int64),
         kind=np.full(len(rows), kind, np.uint8),
         strength=np.ones(len(rows)),
-        planes=Normals(normals, offset, np.zeros(len(rows)), np.zeros(len(rows))),
+        position=cloud.xyz[rows],
+        **one_face(normals),
         num_points=len(cloud),
         num_dropped=int((~np.isfinite(cloud.xyz).all(axis=1)).sum()),
         preset="default",
+        method="surface",
+        reason="asked for",
         parameters={"num_neighbors": 16, "viewpoint": None},
         seconds={"index": 0.125, "normals": 0.25},
     )
@@ -213,6 +215,16 @@ def test_a_point_of_two_kinds_counts_in_both():
     counted = {row["what"]: row["number"] for row in count_table(edges).rows}
     assert counted["of kind crease"] == counted["of kind boundary"] == counted["edge points"] == 2
     assert counted["edge points without a normal"] == 1
+    assert "turn" not in count_table(edges).note
+    bent = replace(edges, angle=np.array([np.nan, np.pi / 2]))
+    assert "Half of the creases turn by more than 90.0 degrees" in count_table(bent).note
+
+
+def test_the_method_is_named_with_its_reason():
+    cloud = Cloud(np.random.default_rng(0).random((20, 3)))
+    table = parameter_table(by_hand(cloud, [1]))
+    assert {"parameter": "method", "value": "surface"} in table.rows
+    assert "asked for" in table.note
 
 
 def test_tables_are_plain_data():

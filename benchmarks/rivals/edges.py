@@ -117,7 +117,7 @@ def _edgel_default(cloud: edgel.Cloud, spacing: float, parameters: Mapping) -> F
     edges = edgel.detect(cloud, **parameters)
     found = _from_edges(edges, time.perf_counter() - begin)
     normals = np.full((len(cloud), 3), np.nan)
-    normals[edges.index] = edges.normals
+    normals[edges.index] = edges.normals[:, 0]
     return replace(found, normals=normals)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, Literal
 
 import numpy as np
@@ -12,12 +12,14 @@ from edgel import paper
 from edgel.boundary import boundary_gaps
 from edgel.cloud import as_cloud, as_vector, check_points
 from edgel.crease import crease_angles
-from edgel.edges import EdgeKind, Edges
+from edgel.edges import EdgeKind, Edges, as_kinds, one_face
 from edgel.kdtree import build_index
 from edgel.normals import check_num_neighbors, fit_planes, towards
 from edgel.stages import Stages
 
 PRESETS = ("default", "paper")
+METHODS = ("auto", "surface", "organized", "orthographic", "pinhole", "spherical")
+DEFAULT_KINDS = EdgeKind.BOUNDARY | EdgeKind.OCCLUDING | EdgeKind.OCCLUDED | EdgeKind.CREASE
 MIN_CREASE_ANGLE = math.radians(25.0)  # a smaller turn is taken for a bend
 MIN_BOUNDARY_GAP = math.radians(110.0)  # a smaller empty sector is taken for uneven sampling
 
@@ -26,6 +28,8 @@ def detect(
     points: Any,
     *,
     preset: Literal["default", "paper"] = "default",
+    kinds: EdgeKind | str | Iterable[str] = DEFAULT_KINDS,
+    method: Literal["auto", "surface", "organized", "orthographic", "pinhole", "spherical"] = "auto",
     num_neighbors: int = 16,
     viewpoint: Any = None,
     progress: Callable[[str], None] | None = None,
@@ -40,6 +44,12 @@ def detect(
         "default" tests every point for a crease or a boundary among its neighbours in 3D, from any side. "paper" is the
         published method as it stands, with its defaults: Canny on a projection along Z. `edgel.paper.detect` has its
         options.
+    kinds : EdgeKind, or str, or iterable of str
+        The kinds of edge wanted, as flags or as names ("boundary", "occluding", "occluded", "crease", "color"); all but
+        color unless told. A point of several kinds keeps the flags of those wanted. "paper" tells no kinds apart.
+    method : {"auto", "surface", "organized", "orthographic", "pinhole", "spherical"}
+        The way to look at the cloud: on the surface itself, from any side; along the rows and columns of an organized
+        cloud; or in a projection of that kind. "auto" chooses, and `Edges.method` and `Edges.reason` say what and why.
     num_neighbors : int
         k of the plane fits that give the normals, the point itself among them; at least 3.
     viewpoint : (3,) array_like, optional
@@ -71,10 +81,19 @@ def detect(
     """
     if preset not in PRESETS:
         raise ValueError(f"preset: expected one of {', '.join(PRESETS)}, got {preset!r}")
+    kinds = as_kinds(kinds)
+    if method not in METHODS:
+        raise ValueError(f"method: expected one of {', '.join(METHODS)}, got {method!r}")
     if preset == "paper":
+        if kinds != DEFAULT_KINDS:
+            raise ValueError("kinds: the paper tells no kinds of edge apart; leave it out, or use the default preset")
+        if method != "auto":
+            raise ValueError("method: the paper has its own, along Z; leave it out, or use the default preset")
         if viewpoint is not None:
             raise ValueError("viewpoint: the paper turns normals by D > 0; leave it out, or use the default preset")
         return paper.detect(points, num_neighbors=num_neighbors, progress=progress)
+    if method not in ("auto", "surface"):  # the one place where the other methods come in
+        raise ValueError(f"method: {method!r} is not there yet; use 'surface', which takes any cloud, or 'auto'")
     cloud = as_cloud(points)
     viewpoint = cloud.viewpoint if viewpoint is None else as_vector(viewpoint, "viewpoint")
     checked = check_points(cloud)
@@ -98,10 +117,13 @@ def detect(
         index=checked.rows[rows],
         kind=kind[rows].astype(np.uint8),
         strength=strength,
-        planes=towards(planes.take(rows), checked.xyz[rows], viewpoint),
+        position=checked.xyz[rows],
+        **one_face(towards(planes.take(rows), checked.xyz[rows], viewpoint).normals),
         num_points=checked.num_input,
         num_dropped=checked.num_dropped,
         preset=preset,
+        method="surface",
+        reason="it takes any cloud, from any side" if method == "auto" else "asked for",
         parameters={"num_neighbors": k},
         seconds=stages.seconds,
-    )
+    ).only(kinds)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from enum import IntFlag
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from edgel.cloud import Cloud, as_cloud
-from edgel.normals import Normals
 
 
 class EdgeKind(IntFlag):
@@ -30,6 +29,12 @@ class EdgeKind(IntFlag):
     """An edge of the projected image, of a kind not told apart (the published method)."""
 
 
+ASKABLE = EdgeKind.BOUNDARY | EdgeKind.OCCLUDING | EdgeKind.OCCLUDED | EdgeKind.CREASE | EdgeKind.COLOR
+"""The kinds that a detector can be asked for; `EdgeKind.IMAGE` is the published method's alone."""
+
+_PER_POINT = ("index", "kind", "strength", "position", "direction", "normals", "angle", "convex")
+
+
 @dataclass(frozen=True, eq=False)
 class Edges:
     """The edge points of a cloud, each once, in the order of the cloud.
@@ -42,14 +47,28 @@ class Edges:
         `EdgeKind` flags.
     strength : (E,) float64
         How marked the edge is, in (0, 1].
-    planes : Normals
-        Best-fit plane of each edge point's neighbours in the whole cloud.
+    position : (E, 3) float64
+        The nearest place on the edge itself, in the cloud's unit; the point where the edge could not be placed better.
+    direction : (E, 3) float64
+        Unit tangent of the edge, of either sign; NaN where unknown.
+    normals : (E, 2, 3) float64
+        Unit normals of the faces on the two sides; the second NaN where there is one face only, both where the
+        neighbours span no plane.
+    angle : (E,) float64
+        How far the surface turns from one face to the other, in radians: 0 where it is smooth, pi/2 at the edge of a
+        cube, up to pi; NaN where only one face is known.
+    convex : (E,) int8
+        1 where the faces meet like the edge of a cube, -1 where like the edge of a hole, 0 where that is not known.
     num_points : int
         Number of points of the input, finite or not.
     num_dropped : int
         How many of them were left out because a coordinate was NaN or infinite.
     preset : str
-        The method that found them.
+        The preset that found them.
+    method : str
+        The way it went: "surface", "organized", "orthographic", "pinhole", "spherical", or "paper".
+    reason : str
+        Why it went that way, one line; empty where there was no choice.
     parameters : mapping
         Its parameters, those it chose itself included.
     seconds : mapping of str to float
@@ -59,10 +78,16 @@ class Edges:
     index: np.ndarray
     kind: np.ndarray
     strength: np.ndarray
-    planes: Normals
+    position: np.ndarray
+    direction: np.ndarray
+    normals: np.ndarray
+    angle: np.ndarray
+    convex: np.ndarray
     num_points: int
     num_dropped: int
     preset: str
+    method: str
+    reason: str
     parameters: Mapping[str, Any]
     seconds: Mapping[str, float]
 
@@ -71,30 +96,134 @@ class Edges:
 
     def __repr__(self) -> str:
         dropped = f", {self.num_dropped:,} not finite" if self.num_dropped else ""
-        return f"Edges({len(self):,} of {self.num_points:,} points, {self.share:.1%}{dropped}; preset {self.preset})"
-
-    @property
-    def normals(self) -> np.ndarray:
-        """Unit normals of the edge points, (E, 3) float64; NaN where the neighbours span no plane."""
-        return self.planes.normals
+        how = f"preset {self.preset}" + (f", method {self.method}" if self.method != self.preset else "")
+        return f"Edges({len(self):,} of {self.num_points:,} points, {self.share:.1%}{dropped}; {how})"
 
     @property
     def share(self) -> float:
         """Edge points among the finite points of the input, 0 to 1."""
         return len(self) / (self.num_points - self.num_dropped)
 
+    @property
+    def num_without_normal(self) -> int:
+        """Number of edge points whose neighbours span no plane, so that not even one normal is known."""
+        return int(np.isnan(self.normals[:, 0, 0]).sum())
+
+    @property
+    def median_crease_angle(self) -> float:
+        """Median of `angle` over the creases where it is known, in radians; NaN where there are none."""
+        known = self.angle[((self.kind & EdgeKind.CREASE) > 0) & ~np.isnan(self.angle)]
+        return float(np.median(known)) if len(known) else float("nan")
+
+    def count_kinds(self) -> dict[str, int]:
+        """Count the edge points by the kinds that occur, by lower-case name; one of two kinds counts in both."""
+        counts = {name: int(((self.kind & kind) > 0).sum()) for name, kind in _NAMES.items()}
+        return {name: number for name, number in counts.items() if number}
+
+    def take(self, rows: np.ndarray) -> Self:
+        """Return some of the edge points (int, ascending, or bool (E,)); times and parameters stay those of all."""
+        return replace(self, **{name: getattr(self, name)[rows] for name in _PER_POINT})
+
+    def only(self, kinds: EdgeKind | str | Iterable[str]) -> Self:
+        """Return the edge points that are of some kinds (see `as_kinds`), without their flags of other kinds.
+
+        The strength stays, that of the most marked of a point's kinds.
+        """
+        wanted = np.uint8(as_kinds(kinds))
+        if not (self.kind & ~wanted).any():
+            return self
+        kept = self.take((self.kind & wanted) > 0)
+        return replace(kept, kind=kept.kind & wanted)
+
     def cloud(self, points: Any) -> Cloud:
-        """Return the edge points of the input as a cloud: all its attributes, and kind, strength and normal."""
-        return self._describe(as_cloud(points).take(self.index), np.arange(len(self)))
+        """Return the edge points of the input as a cloud: all its attributes, and what is known of the edge.
+
+        That is ``edge_kind`` (uint8), ``edge_strength``, ``edge_angle`` (radians), ``edge_convex`` (int8), the normals
+        ``nx ny nz`` and ``nx2 ny2 nz2`` of the two faces, the tangent ``tx ty tz``, and the refined position ``edge_x
+        edge_y edge_z`` (float64); float32 but for those named otherwise, NaN where unknown.
+        """
+        cloud = self._describe(as_cloud(points).take(self.index), np.arange(len(self)))
+        columns = _columns(self.normals[:, 1], ("nx2", "ny2", "nz2"), np.float32)
+        columns |= _columns(self.direction, ("tx", "ty", "tz"), np.float32)
+        columns |= _columns(self.position, ("edge_x", "edge_y", "edge_z"), np.float64)
+        return cloud.with_attributes(**columns)
 
     def label(self, points: Any) -> Cloud:
-        """Return the whole input with the same attributes added; ``edge_kind`` is 0 where there is no edge."""
+        """Return the whole input with ``edge_kind edge_strength edge_angle edge_convex nx ny nz``, as `cloud` has them.
+
+        Where there is no edge the first two and ``edge_convex`` are 0, the others NaN.
+        """
         return self._describe(as_cloud(points), self.index)
 
     def _describe(self, cloud: Cloud, rows: np.ndarray) -> Cloud:
-        kind = np.zeros(len(cloud), np.uint8)
-        strength = np.zeros(len(cloud), np.float32)
+        kind, convex = np.zeros(len(cloud), np.uint8), np.zeros(len(cloud), np.int8)
+        strength, angle = np.zeros(len(cloud), np.float32), np.full(len(cloud), np.nan, np.float32)
         normals = np.full((len(cloud), 3), np.nan, np.float32)
-        kind[rows], strength[rows], normals[rows] = self.kind, self.strength, self.normals
-        nx, ny, nz = normals.T
-        return cloud.with_attributes(edge_kind=kind, edge_strength=strength, nx=nx, ny=ny, nz=nz)
+        kind[rows], strength[rows], angle[rows], convex[rows] = self.kind, self.strength, self.angle, self.convex
+        normals[rows] = self.normals[:, 0]
+        described = {"edge_kind": kind, "edge_strength": strength, "edge_angle": angle, "edge_convex": convex}
+        return cloud.with_attributes(**described, **_columns(normals, ("nx", "ny", "nz"), np.float32))
+
+
+def as_kinds(kinds: EdgeKind | str | Iterable[str]) -> EdgeKind:
+    """Check the kinds a detector is asked for and return them as flags.
+
+    Parameters
+    ----------
+    kinds : EdgeKind, str, or iterable of str
+        Flags, one name, or several; names in upper or lower case.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a name or a flag is no kind that can be asked for, or there is none.
+
+    Examples
+    --------
+    >>> as_kinds(["boundary", "crease"]) == EdgeKind.BOUNDARY | EdgeKind.CREASE
+    True
+    """
+    flags = EdgeKind(0)
+    if isinstance(kinds, int | np.integer):
+        if int(kinds) & ~int(ASKABLE):
+            raise ValueError(f"kinds: expected some of {', '.join(kind_names(ASKABLE))}, got {kinds!r}")
+        flags = EdgeKind(int(kinds))
+    else:
+        for name in [kinds] if isinstance(kinds, str) else kinds:
+            if not isinstance(name, str):
+                raise TypeError(f"kinds: expected EdgeKind flags or names of kinds, got {name!r} among them")
+            if _NAMES.get(name.lower(), EdgeKind.IMAGE) not in ASKABLE:
+                raise ValueError(f"kinds: {name!r} is unknown; choose from {', '.join(kind_names(ASKABLE))}")
+            flags |= _NAMES[name.lower()]
+    if not flags:
+        raise ValueError(f"kinds: none is asked for; choose from {', '.join(kind_names(ASKABLE))}")
+    return flags
+
+
+def kind_names(kinds: EdgeKind) -> list[str]:
+    """Return the lower-case names of some kinds.
+
+    Examples
+    --------
+    >>> kind_names(EdgeKind.CREASE | EdgeKind.BOUNDARY)
+    ['boundary', 'crease']
+    """
+    return [name for name, kind in _NAMES.items() if kind in kinds]
+
+
+def one_face(normals: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the fields of `Edges` that follow where no more is known than one normal (E, 3) a point."""
+    num = len(normals)
+    return {
+        "normals": np.stack([normals, np.full((num, 3), np.nan)], axis=1),
+        "direction": np.full((num, 3), np.nan),
+        "angle": np.full(num, np.nan),
+        "convex": np.zeros(num, np.int8),
+    }
+
+
+def _columns(table: np.ndarray, names: tuple[str, ...], dtype: type) -> dict[str, np.ndarray]:
+    return {name: np.ascontiguousarray(table[:, i], dtype) for i, name in enumerate(names)}
+
+
+_NAMES = {str(kind.name).lower(): kind for kind in EdgeKind}

@@ -197,12 +197,12 @@ def _figure_4(cloud: Cloud, edges: Edges, name: str) -> _Content:
 
 def _figure_5(cloud: Cloud, edges: Edges, name: str) -> _Content:
     direction = "oblique" if isinstance(edges, PaperEdges) else "auto"
-    image = plot.arrows(cloud, edges.index, edges.normals, direction=direction, size=(1500, 940), crop=True)
+    image = plot.arrows(cloud, edges.index, edges.normals[:, 0], direction=direction, size=(1500, 940), crop=True)
     caption = f"Figure 5. {name}: surface normals at the edge points, as arrows at an even selection of them."
     if isinstance(edges, PaperEdges):
         caption += " As in the paper they are turned so that D > 0 (eq. 20), which is not always outwards."
-    if edges.planes.num_undefined:
-        caption += f" {edges.planes.num_undefined:,} edge points have no normal: their neighbours span no plane."
+    if edges.num_without_normal:
+        caption += f" {edges.num_without_normal:,} edge points have no normal: their neighbours span no plane."
     legend = [(plot.EDGE_COLOR, f"edge points: {len(edges):,}"), (plot.ARROW_COLOR, "normals")]
     return _Content(5, caption, [_Panel(image)], legend)
 

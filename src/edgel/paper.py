@@ -8,16 +8,16 @@ the numbers recomputed in docs/errata.md.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 
 from edgel.canny import CannyResult, canny
 from edgel.cloud import check_points
-from edgel.edges import EdgeKind, Edges
+from edgel.edges import EdgeKind, Edges, one_face
 from edgel.kdtree import bounds, build_index
-from edgel.normals import by_offset, check_num_neighbors, plane_fits
+from edgel.normals import Normals, by_offset, check_num_neighbors, plane_fits
 from edgel.project import PixelGrid, back_project, grey_image, occupied_spacing, project
 from edgel.stages import Stages
 
@@ -31,8 +31,12 @@ _MAX_PIXELS = 2**28
 class PaperEdges(Edges):
     """Edges of the published method, with the images they come from.
 
+    It knows of one face only: the second normal, `direction` and `angle` are NaN, `position` is the point itself.
+
     Attributes
     ----------
+    planes : Normals
+        Best-fit plane of each edge point's neighbours in the whole cloud, with D and e of eq. 20.
     grid : PixelGrid
         Where the pixels lie in the cloud.
     image : (H + 2, W + 2) float64
@@ -42,9 +46,14 @@ class PaperEdges(Edges):
         Canny's edge pixels (fig. 3b).
     """
 
+    planes: Normals
     grid: PixelGrid
     image: np.ndarray
     edge_map: np.ndarray
+
+    def take(self, rows: np.ndarray) -> Self:
+        """Return some of the edge points; the images stay those of all."""
+        return replace(super().take(rows), planes=self.planes.take(rows))
 
 
 def detect(
@@ -126,10 +135,14 @@ def detect(
         index=checked.rows[hits.rows],
         kind=np.full(len(hits.rows), EdgeKind.IMAGE, np.uint8),
         strength=np.clip(hits.strength / _STEP_RESPONSE, np.finfo(float).tiny, 1.0),
+        position=checked.xyz[hits.rows],
+        **one_face(planes.normals),
         planes=planes,
         num_points=checked.num_input,
         num_dropped=checked.num_dropped,
         preset="paper",
+        method="paper",
+        reason="the published method looks along Z",
         parameters={
             "width": grid.width,
             "height": grid.height,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,21 +15,25 @@ from edgel.cli import files, options
 from edgel.cli.errors import ExitCode, Failure, as_option, exit_codes, failing_as
 from edgel.cli.output import count, print_json, print_line, print_table, seconds
 from edgel.cli.progress import Watch
-from edgel.detect import PRESETS
-from edgel.edges import EdgeKind, Edges
+from edgel.detect import METHODS, PRESETS
+from edgel.edges import ASKABLE, EdgeKind, Edges, as_kinds, kind_names
 from edgel.stages import Stages
 
 HELP = """Find the edge points of a cloud, their kind, and their normals.
 
 The edge points are written with all attributes of the input and [bold]edge_kind[/bold] (flags: 1 boundary, 2 occluding,
-4 occluded, 8 crease, 16 color, 32 image), [bold]edge_strength[/bold] and [bold]nx ny nz[/bold]. Lengths are in the
-cloud's unit. Without -o only the summary is shown.
+4 occluded, 8 crease, 16 color, 32 image), [bold]edge_strength[/bold] (0 to 1), [bold]edge_angle[/bold] between the two
+faces (radians), [bold]edge_convex[/bold] (1 convex, -1 concave, 0 unknown), the faces' normals [bold]nx ny nz nx2 ny2
+nz2[/bold], the edge's tangent [bold]tx ty tz[/bold] and refined place [bold]edge_x edge_y edge_z[/bold]; what is not
+known is NaN. --all leaves out the second normal, the tangent and the place. Lengths are in the cloud's unit. Without
+-o only the summary is shown.
 
 \b
 Examples:
   edgel detect scan.ply -o edges.ply
   edgel detect scan.las -o labelled.laz --all
   edgel detect depth.png --intrinsics camera.json -o edges.ply
+  edgel detect scan.ply --kinds crease,boundary --method surface -o edges.ply
   edgel detect scan.ply --preset paper --sigma 2 --report report
   cat scan.ply | edgel detect - -o - > edges.ply
 """
@@ -47,6 +52,25 @@ def detect(
     preset: Annotated[
         str, typer.Option(metavar="|".join(PRESETS), help="The method: edgel's own, or the published one.")
     ] = options.default_of(edgel.detect, "preset"),
+    kinds: Annotated[
+        str | None,
+        options.option(
+            edgel.detect,
+            "kinds",
+            f"Kinds of edge to look for, commas between: {', '.join(kind_names(ASKABLE))}.",
+            metavar="NAMES",
+        ),
+    ] = None,
+    method: Annotated[
+        str | None,
+        options.option(
+            edgel.detect,
+            "method",
+            f"How to look at the cloud: {', '.join(METHODS[:-1])} or {METHODS[-1]}. Surface takes any cloud, from any "
+            "side; organized goes along its rows and columns; the last three look at a projection; auto chooses.",
+            metavar="NAME",
+        ),
+    ] = None,
     label_all: Annotated[
         bool, typer.Option("--all", help="Write the whole cloud, labelled; edge_kind is 0 where there is no edge.")
     ] = False,
@@ -75,6 +99,8 @@ def detect(
 ) -> None:
     """Find the edge points of a cloud."""
     given = {
+        "kinds": kinds,
+        "method": method,
         "num_neighbors": num_neighbors,
         "viewpoint": viewpoint,
         "width": width,
@@ -122,7 +148,7 @@ def detect(
 
 
 def check_options(preset: str, given: dict[str, Any]) -> dict[str, Any]:
-    """Return the options given if the preset has them, else raise a `Failure` that names those it has not."""
+    """Return the options given as the preset's function takes them, or raise a `Failure` that names the wrong ones."""
     if preset not in PRESETS:
         raise Failure(ExitCode.USAGE, f"--preset: {preset!r} is unknown; choose {' or '.join(PRESETS)}")
     foreign = [name for name in given if name not in arguments(preset)]
@@ -131,6 +157,11 @@ def check_options(preset: str, given: dict[str, Any]) -> dict[str, Any]:
         others = " or ".join(other for other in PRESETS if set(foreign) <= arguments(other))
         remedy = f"add --preset {others}, or leave it out" if others else "leave it out"
         raise Failure(ExitCode.USAGE, f"{names}: not an option of the {preset} preset; {remedy}")
+    if given.get("method", METHODS[0]) not in METHODS:
+        raise Failure(ExitCode.USAGE, f"--method: {given['method']!r} is unknown; choose {' or '.join(METHODS)}")
+    if "kinds" in given:
+        with failing_as(ExitCode.USAGE, "", ["kinds"]):
+            given["kinds"] = as_kinds([name for word in given["kinds"].split(",") if (name := word.strip())])
     return given
 
 
@@ -160,10 +191,22 @@ def report_on(source: str, cloud: edgel.Cloud, edges: Edges, directory: str) -> 
         return write_report([Case(name, cloud, edges)], directory, title=f"Edges of {name}")
 
 
-def kinds(edges: Edges) -> dict[str, int]:
-    """Count the edge points by kind; a point of two kinds counts in both."""
-    found = {kind.name.lower(): int((edges.kind & kind > 0).sum()) for kind in EdgeKind if kind.name}
-    return {name: number for name, number in found.items() if number}
+def creases(edges: Edges) -> dict[str, Any]:
+    """Return the median angle of the creases, in degrees (NaN where none is known), and how many bend which way."""
+    convex = edges.convex[(edges.kind & EdgeKind.CREASE) > 0]
+    return {
+        "median_angle_degrees": math.degrees(edges.median_crease_angle),
+        "convex": int((convex > 0).sum()),
+        "concave": int((convex < 0).sum()),
+    }
+
+
+def crease_remark(edges: Edges) -> str:
+    """Say of the creases what is known of both their faces."""
+    known = creases(edges)
+    angle = known["median_angle_degrees"]
+    words = [] if math.isnan(angle) else [f"median angle {angle:.1f} degrees"]
+    return ", ".join(words + [f"{count(known[name])} {name}" for name in ("convex", "concave") if known[name]])
 
 
 def collect(
@@ -175,12 +218,15 @@ def collect(
         "output": output,
         "report": None if page is None else str(page),
         "preset": edges.preset,
+        "method": edges.method,
+        "reason": edges.reason,
         "points": edges.num_points,
         "not_finite": edges.num_dropped,
         "edge_points": len(edges),
         "share": edges.share,
-        "kinds": kinds(edges),
-        "normals_undefined": edges.planes.num_undefined,
+        "kinds": edges.count_kinds(),
+        "creases": creases(edges),
+        "normals_undefined": edges.num_without_normal,
         "parameters": edges.parameters,
         "seconds": by_stage,
         "peak_memory_bytes": peak_memory(),
@@ -193,9 +239,11 @@ def summary(edges: Edges, by_stage: dict[str, float]) -> list[tuple[str, ...]]:
     if edges.num_dropped:
         rows.append(("not finite", count(edges.num_dropped), "left out"))
     rows.append(("edge points", count(len(edges)), f"{edges.share:.1%} of the finite points"))
-    rows += [(f"  {name}", count(number)) for name, number in kinds(edges).items()]
-    if edges.planes.num_undefined:
-        rows.append(("normals undefined", count(edges.planes.num_undefined), "the neighbours span no plane"))
+    for name, number in edges.count_kinds().items():
+        rows.append((f"  {name}", count(number), crease_remark(edges) if name == "crease" else ""))
+    if edges.num_without_normal:
+        rows.append(("normals undefined", count(edges.num_without_normal), "the neighbours span no plane"))
+    rows.append(("method", edges.method, edges.reason))
     rows.append(("time", seconds(sum(by_stage.values()))))
     return rows + [(f"  {name}", seconds(duration)) for name, duration in by_stage.items()]
 

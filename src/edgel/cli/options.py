@@ -10,6 +10,7 @@ import typer
 
 import edgel
 from edgel.cli.errors import as_option
+from edgel.edges import EdgeKind, kind_names
 
 PAPER = "The published method (--preset paper)"
 
@@ -43,16 +44,26 @@ def default_of(function: Callable[..., Any], name: str) -> Any:
     return inspect.signature(function).parameters[name].default
 
 
-def option(function: Callable[..., Any], name: str, text: str, *, panel: str | None = None) -> Any:
+def option(
+    function: Callable[..., Any], name: str, text: str, *, panel: str | None = None, metavar: str | None = None
+) -> Any:
     """Make the option that stands for a function's parameter, its default shown but left to the function."""
     default = default_of(function, name)
-    shown = "chosen from the data" if default is None else f"{default:g}"
     return typer.Option(
         as_option(name),
-        help=text + default_note(shown),
+        metavar=metavar,
+        help=text + default_note(_shown(default)),
         show_default=False,
         rich_help_panel=panel,
     )
+
+
+def _shown(default: Any) -> str:
+    if default is None:
+        return "chosen from the data"
+    if isinstance(default, EdgeKind):
+        return ",".join(kind_names(default))
+    return default if isinstance(default, str) else f"{default:g}"
 
 
 def default_note(shown: str) -> str:

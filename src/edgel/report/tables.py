@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+import math
 import os
 import platform
 import re
@@ -11,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from edgel.edges import EdgeKind, Edges
+from edgel.edges import Edges
 from edgel.parallel import num_threads
 
 
@@ -59,12 +60,13 @@ def count_table(edges: Edges) -> Table:
         {"what": "edge points", "number": len(edges), "share": edges.share},
     ]
     finite = edges.num_points - edges.num_dropped
-    for kind in EdgeKind:
-        number = int(((edges.kind & kind) > 0).sum())
-        if number:
-            rows.append({"what": f"of kind {str(kind.name).lower()}", "number": number, "share": number / finite})
-    rows.append({"what": "edge points without a normal", "number": edges.planes.num_undefined, "share": None})
-    return Table("Counts", rows, {"number": ",d", "share": ".1%"}, "Shares are of the finite points.")
+    for name, number in edges.count_kinds().items():
+        rows.append({"what": f"of kind {name}", "number": number, "share": number / finite})
+    rows.append({"what": "edge points without a normal", "number": edges.num_without_normal, "share": None})
+    note = "Shares are of the finite points."
+    if not math.isnan(edges.median_crease_angle):
+        note += f" Half of the creases turn by more than {math.degrees(edges.median_crease_angle):.1f} degrees."
+    return Table("Counts", rows, {"number": ",d", "share": ".1%"}, note)
 
 
 def time_table(edges: Edges) -> Table:
@@ -77,9 +79,10 @@ def time_table(edges: Edges) -> Table:
 
 def parameter_table(edges: Edges) -> Table:
     """Parameters of the method, those it chose itself included."""
-    rows = [{"parameter": "preset", "value": edges.preset}]
+    rows = [{"parameter": "preset", "value": edges.preset}, {"parameter": "method", "value": edges.method}]
     rows += [{"parameter": name, "value": value} for name, value in edges.parameters.items()]
-    return Table("Parameters", rows, {"value": "g"}, "Lengths are in the cloud's unit.")
+    why = f" Why the method {edges.method}: {edges.reason}." if edges.reason else ""
+    return Table("Parameters", rows, {"value": "g"}, f"Lengths are in the cloud's unit.{why}")
 
 
 def machine_table() -> Table:
