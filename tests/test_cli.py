@@ -208,7 +208,7 @@ def test_every_argument_of_the_detectors_is_an_option_and_its_default_is_shown()
         ("--method", "auto"),
     ):
         text = " ".join(page.replace("\N{BOX DRAWINGS LIGHT VERTICAL}", " ").split())
-        said = text[text.index(f" {option} ") :]
+        said = text[text.rindex(f" {option} ") :]  # the examples come first
         assert said[said.index("[default:") :].startswith(f"[default: {default}]")
 
 
