@@ -41,7 +41,7 @@ TUNE_SHAPES = {
 }
 
 VIEWS = synth.PROJECTIONS
-PATTERNS = synth.PATTERNS
+PATTERNS = ("uniform", "blue_noise", "scan_lines", "graded")
 POSES = (
     {"direction": (-0.48, 0.66, -0.58), "roll": 0.2},
     {"direction": (0.62, 0.41, -0.67), "roll": -0.35},

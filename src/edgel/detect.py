@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable
 from typing import Any, Literal
 
 import numpy as np
 
 from edgel import paper
-from edgel.boundary import boundary_gaps
 from edgel.cloud import as_cloud, as_vector, check_points
-from edgel.crease import crease_angles
 from edgel.edges import EdgeKind, Edges, as_kinds, one_face
+from edgel.evidence import crease_probability, examine, outline_probability, screen, survey
+from edgel.evidence.faces import faces
 from edgel.kdtree import build_index
-from edgel.normals import check_num_neighbors, fit_planes, towards
+from edgel.normals import check_num_neighbors, plane_fits, towards
 from edgel.stages import Stages
 
 PRESETS = ("default", "paper")
 METHODS = ("auto", "surface", "organized", "orthographic", "pinhole", "spherical")
 DEFAULT_KINDS = EdgeKind.BOUNDARY | EdgeKind.OCCLUDING | EdgeKind.OCCLUDED | EdgeKind.CREASE
-MIN_CREASE_ANGLE = math.radians(25.0)  # a smaller turn is taken for a bend
-MIN_BOUNDARY_GAP = math.radians(110.0)  # a smaller empty sector is taken for uneven sampling
+CREASE = 0.45  # least probability of a crease
+OUTLINE = 0.5  # least probability that the surface ends
 
 
 def detect(
@@ -102,23 +101,32 @@ def detect(
     stages = Stages(progress)
     with stages("index"):
         index = build_index(checked.xyz)
-    with stages("normals"):
-        planes = fit_planes(index, index, k)
-    if planes.num_undefined == len(planes):
-        raise ValueError("points: all lie on one line or spot, so there is no surface whose edges could be found")
-    with stages("creases"):
-        angles = crease_angles(index, checked.xyz, MIN_CREASE_ANGLE)
-    with stages("boundaries"):
-        gaps = boundary_gaps(index, planes.normals, MIN_BOUNDARY_GAP)
-    kind = np.where(angles > 0, EdgeKind.CREASE, 0) | np.where(gaps > 0, EdgeKind.BOUNDARY, 0)
-    rows = np.flatnonzero(kind)
-    strength = np.maximum(angles / (math.pi / 2), gaps / (2 * math.pi))[rows]
+    with stages("survey"):
+        surveyed = survey(index)
+        if not surveyed.has_surface:
+            raise ValueError("points: all lie on one line or spot, so there is no surface whose edges could be found")
+        rows = screen(index, surveyed)
+    with stages("evidence"):
+        evidence = examine(index, surveyed, checked.xyz[rows])
+    with stages("decision"):
+        crease, outline = crease_probability(evidence), outline_probability(evidence)
+        kind = np.where(crease >= CREASE, EdgeKind.CREASE, 0) | np.where(outline >= OUTLINE, EdgeKind.BOUNDARY, 0)
+        found = np.flatnonzero(kind)
+    with stages("faces"):
+        at, rows, kind = checked.xyz[rows[found]], rows[found], kind[found].astype(np.uint8)
+        sides = faces(evidence.take(found), at, viewpoint)
+        planes = towards(plane_fits(index, at, k), at, viewpoint)
+        hinge = ((kind & EdgeKind.CREASE) > 0) & (sides.convex != 0)
+        normals = np.where(hinge[:, None, None], sides.normals, one_face(planes.normals)["normals"])
     return Edges(
         index=checked.rows[rows],
-        kind=kind[rows].astype(np.uint8),
-        strength=strength,
-        position=checked.xyz[rows],
-        **one_face(towards(planes.take(rows), checked.xyz[rows], viewpoint).normals),
+        kind=kind,
+        strength=np.maximum(crease, outline)[found],
+        position=np.where(hinge[:, None], sides.position, at),
+        direction=np.where(hinge[:, None], sides.direction, np.nan),
+        normals=normals,
+        angle=np.where(hinge, sides.angle, np.nan),
+        convex=np.where(hinge, sides.convex, 0).astype(np.int8),
         num_points=checked.num_input,
         num_dropped=checked.num_dropped,
         preset=preset,

@@ -1,6 +1,6 @@
 """Parts with known edges, and scanners that see them: the ground truth of the method. Lengths in millimetres."""
 
-from edgel.synth.curved import bezier_ridge, cylinder, gear, plane, sphere, torus, wavy_sheet
+from edgel.synth.curved import bezier_ridge, cylinder, gear, lathe, plane, prism, sphere, torus, wavy_sheet
 from edgel.synth.edges import EDGE_KINDS, EdgeCurve, NearestEdge, nearest_edge
 from edgel.synth.fittings import elbow, tee
 from edgel.synth.part import Hits, Part
@@ -34,9 +34,11 @@ __all__ = [
     "from_polygons",
     "frustum",
     "gear",
+    "lathe",
     "make_solid",
     "nearest_edge",
     "plane",
+    "prism",
     "sample",
     "scan",
     "sphere",

@@ -116,6 +116,89 @@ def cylinder(*, radius: float = 20.0, height: float = 50.0) -> Solid:
     return make_solid("cylinder", corners, face, normals, spacing=spacing)
 
 
+def lathe(
+    profile: Sequence[tuple[float, float]], *, fillets: Sequence[float] | None = None, spacing: float = 0.8
+) -> Solid:
+    """Turn a profile about the z axis: a round crease at each of its corners that has no fillet.
+
+    Parameters
+    ----------
+    profile : sequence of (radius, z)
+        Corners in order with the solid on their left, mm; from the axis to the axis, or a closed loop off it (then the
+        first corner is not repeated).
+    fillets : sequence of float, optional
+        Radius, mm, at each corner; 0 is sharp. They must leave something of every side.
+    spacing : float
+        See `Solid.spacing`.
+    """
+    corners = np.asarray(profile, np.float64)
+    pieces = _rounded(corners, fillets, closed=corners[0, 0] > 0, spacing=spacing)
+    angle = np.linspace(0, 2 * np.pi, _steps(corners[:, 0].max(), 2 * np.pi, spacing) + 1)
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    ring[-1] = ring[0]  # to the last bit, or the seam would be a boundary
+
+    def turned(line: np.ndarray) -> np.ndarray:
+        around = line[None, :, :1] * ring[:, None]
+        return np.concatenate([around, np.broadcast_to(line[None, :, 1:], (*around.shape[:2], 1))], axis=2)
+
+    return _patches("lathe", [(turned(points), turned(normals)) for points, normals in pieces], spacing=spacing)
+
+
+def prism(
+    corners: Sequence[tuple[float, float]],
+    *,
+    height: float,
+    fillets: Sequence[float] | None = None,
+    spacing: float = 0.8,
+) -> Solid:
+    """Raise a convex polygon, counterclockwise, from z = 0 to `height`, mm; upright edges may have fillets."""
+    pieces = _rounded(np.asarray(corners, np.float64), fillets, closed=True, spacing=spacing)
+    parts = []
+    for points, normals in pieces:
+        wall, out = _upright(points, height), _upright(normals, 0.0)
+        parts.append((grid_triangles(wall), grid_triangles(out)))
+    outline = np.concatenate([*(points[:-1] for points, _ in pieces), pieces[0][0][:1]])
+    middle = outline[:-1].mean(axis=0)
+    for z, flip in ((0.0, -1), (height, 1)):
+        ends = np.stack([outline, np.broadcast_to(middle, outline.shape)], axis=1)[:, ::flip]
+        cap = grid_triangles(np.concatenate([ends, np.full((*ends.shape[:2], 1), z)], axis=2))
+        parts.append((cap, np.broadcast_to([0.0, 0.0, float(flip)], cap.shape)))
+    face = np.repeat(np.arange(len(parts)), [len(triangles) for triangles, _ in parts])
+    triangles, normals = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return make_solid("prism", triangles, face, normals, spacing=spacing)
+
+
+def _rounded(
+    corners: np.ndarray, fillets: Sequence[float] | None, *, closed: bool, spacing: float
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Sides and fillets of a plane polyline (C, 2), the inside on its left: points and outer normals (P, 2) of each."""
+    count = len(corners)
+    radii = np.zeros(count) if fillets is None else np.asarray(fillets, np.float64)
+    if radii.shape != (count,):
+        raise ValueError(f"fillets: expected one for each of {count} corners, got {radii.shape}")
+    before, after = np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0)
+    arrive, leave = _unit(corners - before), _unit(after - corners)
+    turn = np.arctan2(arrive[:, 0] * leave[:, 1] - arrive[:, 1] * leave[:, 0], (arrive * leave).sum(axis=1))
+    if not closed:
+        radii = np.where((np.arange(count) == 0) | (np.arange(count) == count - 1), 0, radii)
+    trim = radii * np.abs(np.tan(turn / 2))
+    starts, stops = corners + trim[:, None] * leave, after - np.roll(trim, -1)[:, None] * leave
+    if (((stops - starts) * leave).sum(axis=1)[: count if closed else -1] <= 0).any():
+        raise ValueError("fillets: they leave nothing of a side")
+    pieces = []
+    for i in range(count if closed else count - 1):
+        if radii[i] > 0:
+            out = np.array([arrive[i, 1], -arrive[i, 0]])
+            centre = corners[i] - trim[i] * arrive[i] - np.sign(turn[i]) * radii[i] * out
+            swing = np.linspace(0, turn[i], max(4, _steps(radii[i], abs(turn[i]), spacing)) + 1)[:, None]
+            normals = np.cos(swing) * out + np.sin(swing) * np.array([-out[1], out[0]])
+            points = centre + np.sign(turn[i]) * radii[i] * normals
+            points[0], points[-1] = corners[i] - trim[i] * arrive[i], starts[i]
+            pieces.append((points, normals))
+        pieces.append((np.stack([starts[i], stops[i]]), np.tile([leave[i, 1], -leave[i, 0]], (2, 1))))
+    return pieces
+
+
 def _patches(name: str, patches: Sequence[tuple[np.ndarray, np.ndarray]], *, spacing: float) -> Solid:
     """Join grids of points and unit normals, each (M, N, 3): every grid is one face."""
     corners = [grid_triangles(points) for points, _ in patches]

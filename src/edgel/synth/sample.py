@@ -11,7 +11,7 @@ from edgel.synth.solid import Solid
 from edgel.synth.truth import CREASE_REACH, CREASE_TURN, STEP, Scene, near_edges, sample_curves
 from edgel.synth.view import check_options, surface_normals
 
-PATTERNS = ("uniform", "blue_noise", "scan_lines", "graded")
+PATTERNS = ("uniform", "blue_noise", "scan_lines", "graded", "vertices")
 _SWEEP = np.array([0.81, 0.47, 0.35])  # normal of the scan lines' planes: oblique, so that every face has lines
 _ANISOTROPY = 10.0
 _GRADE = 4.0
@@ -33,10 +33,11 @@ def sample(
     Parameters
     ----------
     solid : Solid
-    pattern : {"uniform", "blue_noise", "scan_lines", "graded"}
+    pattern : {"uniform", "blue_noise", "scan_lines", "graded", "vertices"}
         Independent uniform points; points that keep a distance of 0.75 spacings (Poisson disc); lines whose mean
-        distance on the surface is 10 times the step along them, with one shot in regular steps; or independent points
-        whose density falls to a quarter along the longest axis.
+        distance on the surface is 10 times the step along them, with one shot in regular steps; independent points
+        whose density falls to a quarter along the longest axis; or, as a mesher sets its vertices, points in steps of
+        a spacing exactly on all creases and boundaries, and a Poisson disc between them.
     spacing : float
         Root of the surface's area over the number of points, mm.
     noise : float
@@ -107,11 +108,47 @@ def _blue_noise(solid: Solid, spacing: float, rng: np.random.Generator) -> tuple
     """Throw darts; keep those that land farther than a disc from all kept before (Cook 1986, doi:10.1145/7529.8927)."""
     triangle, weights = _scatter(solid, round(_TRIES * solid.area / spacing**2), rng)
     places = np.einsum("ij,ijk->ik", weights, solid.corners[triangle])
-    radius = _DISC * spacing
+    keep = _keep_apart(places, _DISC * spacing)
+    return triangle[keep], weights[keep]
+
+
+def _keep_apart(places: np.ndarray, radius: float) -> np.ndarray:
+    """Tell which places (N, 3), taken in turn, are no nearer than the radius to any kept before; (N,) bool."""
     cells = np.floor((places - places.min(axis=0)) / radius).astype(np.int64) + 1
     keep = np.zeros(len(places), bool)
     _throw(places, cells, cells.max(axis=0) + 2, radius, keep)
+    return keep
+
+
+def _vertices(solid: Solid, spacing: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """A Poisson disc whose first darts are set along the creases and boundaries."""
+    curves = [*solid.creases, *solid.boundaries]
+    on_edges = sample_curves(curves, spacing).positions if curves else np.empty((0, 3))
+    triangle, weights = _scatter(solid, round(_TRIES * solid.area / spacing**2), rng)
+    places = np.einsum("ij,ijk->ik", weights, solid.corners[triangle])
+    edge_triangle, edge_weights = _on_surface(solid, on_edges)
+    triangle, weights = np.concatenate([edge_triangle, triangle]), np.concatenate([edge_weights, weights])
+    places = np.concatenate([on_edges, places])
+    keep = _keep_apart(places, _DISC * spacing)
     return triangle[keep], weights[keep]
+
+
+def _on_surface(solid: Solid, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (N,) that hold places (N, 3) on the surface, and the weights (N, 3) of their corners there."""
+    triangle, weights = np.zeros(len(places), np.int64), np.zeros((len(places), 3))
+    for i, place in enumerate(places):
+        a, b, c = np.moveaxis(solid.corners, 1, 0)
+        u, v, w = b - a, c - a, place - a
+        uu, uv, vv = (u * u).sum(1), (u * v).sum(1), (v * v).sum(1)
+        wu, wv = (w * u).sum(1), (w * v).sum(1)
+        det = np.maximum(uu * vv - uv * uv, 1e-30)
+        s, t = (vv * wu - uv * wv) / det, (uu * wv - uv * wu) / det
+        bary = np.clip(np.stack([1 - s - t, s, t], axis=1), 0, None)
+        bary /= bary.sum(axis=1, keepdims=True)
+        off = ((bary[:, :, None] * solid.corners).sum(axis=1) - place) ** 2
+        best = int(off.sum(axis=1).argmin())
+        triangle[i], weights[i] = best, bary[best]
+    return triangle, weights
 
 
 def _graded(solid: Solid, spacing: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -203,4 +240,10 @@ def _throw(places, cells, shape, radius, keep):
             following[p], first[cell] = first[cell], p
 
 
-_PATTERNS = {"uniform": _uniform, "blue_noise": _blue_noise, "scan_lines": _scan_lines, "graded": _graded}
+_PATTERNS = {
+    "uniform": _uniform,
+    "blue_noise": _blue_noise,
+    "scan_lines": _scan_lines,
+    "graded": _graded,
+    "vertices": _vertices,
+}

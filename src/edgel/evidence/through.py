@@ -1,4 +1,4 @@
-"""Crease test 2: two planes through the point itself, each spanned with two of its neighbours.
+"""Two planes through the point itself, each spanned with two of its neighbours.
 
 Minimal samples average nothing away: the test works on plates little thicker than the spacing, and suffers under noise.
 """
@@ -11,40 +11,36 @@ import numpy as np
 
 from edgel.parallel import kernel
 
-NEIGHBORS = 21  # that vote for a plane, the point among them
 _SPANNING = 10  # nearest ones that span planes
-_INLIER = 0.15  # how far from a plane its inliers lie at most, in spacings
-_SUPPORT = 4.0  # least weight of the second plane's inliers, among those that the first leaves over
+FITS = ((11, 0.08), (21, 0.15), (21, 0.3))  # neighbours that vote, and how far from a plane inliers lie, in spacings
+NUM_FEATURES = 5
 _ASIDE = 0.4  # nearer to the line, in spacings, an inlier lies on no side of it
-_TWO_SIDED = (
-    0.15  # most of the inliers lie on one side of the line: fewer than this on the other, for one for the other
-)
 _FLAT = 0.3  # neighbours in line with the point, area below this many spacings squared, span no plane
 
 
 @kernel
-def planes_through(vectors, count, spacing, cos_min):
-    """Return the angle between the two planes through a point in radians, 0 where it is on no crease.
+def planes_through(vectors, count, spacing, inlier, cos_min, features):
+    """Describe the two best planes through a point that differ by the least angle or more.
 
-    Takes the neighbours (count, 3) relative to the point, nearest first; its spacing; the cosine of the least angle.
+    Takes the neighbours (count, 3) relative to the point, nearest first; its spacing; how far from a plane its inliers
+    lie at most, in spacings; the cosine of the least angle. Writes to `features` (5,): the angle between the planes,
+    their support, and how evenly the inliers of each lie on both sides of their line: a smooth bend has inliers of its
+    tangent plane on both, a face only on its own.
     """
-    tolerance = _INLIER * spacing
+    features[:] = 0.0
+    tolerance = inlier * spacing
     a, b = np.zeros(3), np.zeros(3)
-    _best_plane(vectors, count, spacing, tolerance, a, 2.0, a)
-    support = _best_plane(vectors, count, spacing, tolerance, a, cos_min, b)
-    if support < _SUPPORT:
-        return 0.0
+    features[1] = _best_plane(vectors, count, spacing, tolerance, a, 2.0, a)
+    features[2] = _best_plane(vectors, count, spacing, tolerance, a, cos_min, b)
     lx, ly, lz = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
     length = math.sqrt(lx * lx + ly * ly + lz * lz)
-    if length == 0.0:
-        return 0.0
+    if features[2] == 0.0 or length == 0.0:
+        features[3] = features[4] = 1.0
+        return
     lx, ly, lz = lx / length, ly / length, lz / length
-    # A smooth bend has inliers of its tangent plane on both sides of the line, a face only on its own.
-    balance_a = _balance(vectors, count, tolerance, spacing, a, lx, ly, lz)
-    balance_b = _balance(vectors, count, tolerance, spacing, b, lx, ly, lz)
-    if min(balance_a, balance_b) >= _TWO_SIDED:
-        return 0.0
-    return math.acos(min(abs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2]), 1.0))
+    features[0] = math.acos(min(abs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2]), 1.0))
+    features[3] = _balance(vectors, count, tolerance, spacing, a, lx, ly, lz)
+    features[4] = _balance(vectors, count, tolerance, spacing, b, lx, ly, lz)
 
 
 @kernel

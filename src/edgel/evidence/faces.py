@@ -1,0 +1,83 @@
+"""Where exactly an edge runs, and the surface on either side: from the best of the fits of two planes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from edgel.evidence import FITS, Evidence
+
+_MAX_AWAY = 1.5  # spacings: a line farther from the point is not its edge
+_MIN_TURN = math.radians(12.0)
+_FLOOR = 0.02  # spacings: residuals below it do not make one fit better than another
+
+
+@dataclass(frozen=True, eq=False)
+class Faces:
+    """The geometry of edges at some points; NaN where no fit explains the point.
+
+    Attributes
+    ----------
+    position : (M, 3) float64
+        Foot of the point on the line in which the planes meet.
+    direction : (M, 3) float64
+        Unit tangent of that line.
+    normals : (M, 2, 3) float64
+        Unit normals of both planes, on the side the viewer is on.
+    angle : (M,) float64
+        Turn from one plane to the other, radians, 0 to pi.
+    convex : (M,) int8
+        1 where the side of the normals is the outside of the wedge, -1 where it is the inside, 0 where unknown.
+    """
+
+    position: np.ndarray
+    direction: np.ndarray
+    normals: np.ndarray
+    angle: np.ndarray
+    convex: np.ndarray
+
+
+def faces(evidence: Evidence, xyz: np.ndarray, viewpoint: np.ndarray | None) -> Faces:
+    """Choose for each point (M, 3) the fit that places its edge best, and describe the edge by it.
+
+    The error of a line fitted to K points falls with the residual over the root of K: small fits win at curved and
+    crowded edges, large ones under noise. Normals are turned towards the viewpoint, or upwards (+Z) without one.
+    """
+    found = evidence.sheets.astype(np.float64)
+    a, b, line, foot, middle_a, middle_b = (found[:, :, i : i + 3] for i in (0, 3, 6, 9, 14, 17))
+    wing_a, wing_b = _wing(middle_a - foot, line), _wing(middle_b - foot, line)
+    turn = math.pi - np.arccos(np.clip((wing_a * wing_b).sum(axis=2), -1, 1))
+    error = (evidence.residuals + _FLOOR) / np.sqrt([count for count, _ in FITS])
+    error[(evidence.away > _MAX_AWAY) | ~(turn > _MIN_TURN)] = np.inf
+    rows, best = np.arange(len(found)), error.argmin(axis=1)
+    known = np.isfinite(error[rows, best])
+    a, b, line, foot, wing_a, wing_b = (part[rows, best] for part in (a, b, line, foot, wing_a, wing_b))
+    # Turned so that each normal points away from the other face's wing, both lie on the outside of the wedge.
+    a, b = _away_from(a, wing_b), _away_from(b, wing_a)
+    out = a + b
+    if viewpoint is None:
+        inside = (out[:, 2] < 0) | ((out[:, 2] == 0) & ((out[:, 1] < 0) | ((out[:, 1] == 0) & (out[:, 0] < 0))))
+    else:
+        inside = ((viewpoint - xyz) * out).sum(axis=1) < 0
+    sign = np.where(inside, -1.0, 1.0)
+    unknown = np.where(known, 1.0, np.nan)[:, None]
+    return Faces(
+        position=xyz + foot * unknown,
+        direction=line * unknown,
+        normals=np.stack([a, b], axis=1) * (sign[:, None] * unknown)[:, None],
+        angle=turn[rows, best] * unknown[:, 0],
+        convex=np.where(known, sign, 0).astype(np.int8),
+    )
+
+
+def _wing(into: np.ndarray, line: np.ndarray) -> np.ndarray:
+    """Unit vectors from the line into a face."""
+    across = into - (into * line).sum(axis=2, keepdims=True) * line
+    length = np.linalg.norm(across, axis=2, keepdims=True)
+    return across / np.where(length > 0, length, np.nan)
+
+
+def _away_from(normals: np.ndarray, wing: np.ndarray) -> np.ndarray:
+    return np.where((normals * wing).sum(axis=1, keepdims=True) > 0, -normals, normals)
