@@ -12,10 +12,10 @@ from edgel.edges import EdgeKind
 from edgel.parallel import kernel, run_slices
 from edgel.raster import Raster
 
-STEP = 1.5  # spacings: least break of the surface between two pixels
+STEP = 2.0  # spacings: least break of the surface between two pixels
 GAP = 2.0  # spacings: least difference of their depths
-SURE = 4.5  # standard deviations by which a break exceeds what noise explains
-WEAK = 3.0  # and where it continues one that does
+SURE = 6.0  # standard deviations by which a break exceeds what noise explains
+WEAK = 4.0  # and where it continues one that does
 CHAIN = 8  # pixels: shorter chains, both sides together, are specks
 BRIDGE = 2  # pixels: a hole no wider is bridged
 SECTORS = 16

@@ -10,6 +10,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from edgel.kdtree import build_index
+from edgel.neighbors import knn
+from edgel.parallel import kernel
+
+FRAME = 4  # empty pixels around a projection, so that the cloud's rim lies beside a void
+_SAMPLE = 2000  # points at which the evenness of the image is looked at
+_RINGS = 0.25  # nearest neighbours this much flatter than 45 degrees lie on scan lines along the rows
+_EVEN = 0.75  # nearest neighbours of a grid are 1 spacing away, those of random points 0.5
+_LOOSE = 1.3  # pixels of random points are this much larger than their spacing, or a third would be empty
+_MOST_PIXELS = 50  # for each point
+
 
 @dataclass(frozen=True, eq=False)
 class Raster:
@@ -30,6 +41,8 @@ class Raster:
         Where the rays leave; None where they are parallel.
     direction : (3,) float64
         Unit vector along the parallel rays, or along the middle one.
+    behind : (N,) float64
+        How far each point lies behind the one that its pixel shows, in spacings; 0 for the points shown.
     """
 
     depth: np.ndarray
@@ -38,6 +51,7 @@ class Raster:
     pitch: tuple[float, float]
     viewpoint: np.ndarray | None
     direction: np.ndarray
+    behind: np.ndarray
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -90,7 +104,167 @@ def organized(
     image = np.full(shape, np.nan)
     image.ravel()[rows] = depth
     pitch = [float(np.median(step)) if len(step) else 1.0 for step in steps]
-    return Raster(image, index, "organized", (pitch[0], pitch[1]), eye, middle / np.linalg.norm(middle))
+    return Raster(image, index, "organized", (pitch[0], pitch[1]), eye, _unit(middle), np.zeros(len(xyz)))
+
+
+def orthographic(xyz: np.ndarray, direction: np.ndarray) -> Raster:
+    """Project points along parallel rays.
+
+    Parameters
+    ----------
+    xyz : (N, 3) float64, finite
+    direction : (3,)
+        In which the viewer looks; (0, 0, -1) looks down.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> x, y = np.meshgrid(np.arange(30.0), np.arange(20.0))
+    >>> raster = orthographic(np.c_[x.ravel(), y.ravel(), 0 * x.ravel()], np.array([0, 0, -1]))
+    >>> raster.shape, int((raster.index >= 0).sum())
+    ((28, 38), 600)
+    """
+    right, down, forward = _axes(direction, np.array([0.0, 0.0, 1.0]))
+    centred = xyz - xyz.mean(axis=0)  # far from the origin the image's coordinates would lose their digits
+    picture = np.column_stack([centred @ right, centred @ down])
+    return _rastered(xyz, picture, xyz @ forward, "orthographic", None, forward)
+
+
+def pinhole(xyz: np.ndarray, viewpoint: np.ndarray) -> Raster:
+    """Project points onto the plane of a camera that looks from the viewpoint at their middle.
+
+    Raises
+    ------
+    ValueError
+        If a point lies beside or behind such a camera.
+    """
+    rays = xyz - viewpoint
+    right, down, forward = _axes(rays.mean(axis=0), np.array([0.0, 0.0, 1.0]))
+    ahead = rays @ forward
+    if not (ahead > 0).all():
+        raise ValueError("viewpoint: some points lie beside or behind a camera there; use a spherical projection")
+    picture = np.column_stack([rays @ right / ahead, rays @ down / ahead])
+    return _rastered(xyz, picture, np.linalg.norm(rays, axis=1), "pinhole", viewpoint, forward)
+
+
+def spherical(xyz: np.ndarray, viewpoint: np.ndarray, up: np.ndarray | None = None) -> Raster:
+    """Project points onto a sphere about the viewpoint: azimuth along the rows, elevation along the columns.
+
+    Parameters
+    ----------
+    xyz : (N, 3) float64, finite
+    viewpoint : (3,)
+    up : (3,), optional
+        The sensor's axis; default +Z.
+    """
+    rays = xyz - viewpoint
+    up = np.array([0.0, 0.0, 1.0]) if up is None else up
+    level = rays.mean(axis=0)
+    right, down, forward = _axes(level - (level @ up) * up, up)
+    ahead, aside = rays @ forward, rays @ right
+    picture = np.column_stack([np.arctan2(aside, ahead), np.arctan2(rays @ down, np.hypot(ahead, aside))])
+    return _rastered(xyz, picture, np.linalg.norm(rays, axis=1), "spherical", viewpoint, forward)
+
+
+def _axes(direction: np.ndarray, up: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Right, down and forward of a viewer."""
+    length = np.linalg.norm(direction)
+    forward = direction / length if length > 1e-12 else np.roll(up, 1)
+    if abs(forward @ up) > 0.99 * np.linalg.norm(up):
+        up = np.roll(up, -1)
+    right = np.cross(forward, up)
+    right = right / np.linalg.norm(right)
+    return right, np.cross(forward, right), forward
+
+
+def _rastered(
+    xyz: np.ndarray, picture: np.ndarray, depth: np.ndarray, method: str, viewpoint: np.ndarray | None, forward: np.ndarray
+) -> Raster:
+    """Let each pixel show the nearest of its points."""
+    low, high = picture.min(axis=0), picture.max(axis=0)
+    across, along = image_pitch(picture)
+    growth = np.sqrt(((high - low) / (across, along) + 1).prod() / (_MOST_PIXELS * len(xyz) + 10_000))
+    size = np.array([across, along]) * max(growth, 1.0)
+    # Half a pixel off the lowest point: points of a grid then lie in the middle of their pixels.
+    cells = np.floor((picture - low) / size + 0.5).astype(np.int64) + FRAME
+    width, height = (int(count) for count in np.floor((high - low) / size + 0.5) + 1 + 2 * FRAME)
+    index = np.full(height * width, -1)
+    pixels = cells[:, 1] * width + cells[:, 0]
+    _nearest(pixels, depth, xyz, index)
+    image = np.where(index >= 0, depth[index], np.nan)
+    pitch = (float(size[1]), float(size[0]))
+    front = image[pixels]
+    spacing = np.sqrt(pitch[0] * pitch[1]) * (1.0 if viewpoint is None else np.maximum(front, 1e-300))
+    layout = (height, width)
+    return Raster(
+        image.reshape(layout), index.reshape(layout), method, pitch, viewpoint, forward, (depth - front) / spacing
+    )
+
+
+def image_pitch(picture: np.ndarray) -> tuple[float, float]:
+    """Measure how far apart points lie in an image, along its rows and along its columns.
+
+    Parameters
+    ----------
+    picture : (N, 2) float64
+        Place of each point: right, down.
+    """
+    extent = np.ptp(picture, axis=0)
+    flat = np.column_stack([picture, np.zeros(len(picture))])
+    if len(picture) < 2 or not extent.any():
+        return 1.0, 1.0
+    side = float(np.sqrt(_covered(picture) / len(picture)))
+    index = build_index(flat)
+    # Every n-th point of the sorted tree: a sample that lies evenly and does not depend on the order of the input.
+    rows = index.order[:: max(len(index) // _SAMPLE, 1)]
+    near = knn(index, np.ascontiguousarray(flat[rows]), min(9, len(flat)))
+    # The nearest that is elsewhere: clouds repeat points.
+    elsewhere = near.distances > 1e-6 * side
+    first = np.argmax(elsewhere, axis=1)
+    known = elsewhere.any(axis=1)
+    picked = near.rows[np.arange(len(rows)), first][known]
+    step = np.abs(picture[picked] - picture[rows[known]])
+    if len(step) == 0:
+        return side, side
+    right, down = np.median(step, axis=0)
+    if down < _RINGS * right and right < side:
+        return float(right), float(side * side / right)
+    even = np.median(np.hypot(*step.T)) > _EVEN * side
+    return (side, side) if even else (_LOOSE * side, _LOOSE * side)
+
+
+def _covered(picture: np.ndarray) -> float:
+    """Area of an image that points cover, in square cells of about 8 points."""
+    low, extent = picture.min(axis=0), np.ptp(picture, axis=0)
+    area = float(extent.prod()) or float(extent.max()) ** 2 / len(picture)
+    for _ in range(4):  # a cloud that covers little of its box has more points in a cell, so cells may shrink
+        cell = np.sqrt(8 * area / len(picture))
+        columns = int(extent[0] / cell) + 1
+        places = np.floor((picture - low) / cell).astype(np.int64)
+        counts = np.bincount(places[:, 1] * columns + places[:, 0]) if columns < 1e7 else np.array([8])
+        area = float(np.count_nonzero(counts) * cell**2)
+        # Cells on the rim are only half full.
+        full = counts[counts > 0]
+        area *= float(np.mean(np.minimum(full / np.median(full), 1.0)))
+    return area
+
+
+@kernel
+def _nearest(pixels, depth, xyz, index):
+    for p in range(len(pixels)):
+        q = index[pixels[p]]
+        if q < 0 or depth[p] < depth[q]:
+            index[pixels[p]] = p
+        elif depth[p] == depth[q]:
+            for axis in range(3):  # of two at the same depth the one of smaller coordinates, whatever their order
+                if xyz[p, axis] != xyz[q, axis]:
+                    if xyz[p, axis] < xyz[q, axis]:
+                        index[pixels[p]] = p
+                    break
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / np.linalg.norm(vector)
 
 
 def _neighbours(index: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
