@@ -13,6 +13,7 @@ from edgel.parallel import kernel, run_slices
 from edgel.raster import Raster
 
 STEP = 2.0  # spacings: least break of the surface between two pixels
+LEVELS = 3.0  # and of the levels to which the sensor rounds depths
 GAP = 2.0  # spacings: least difference of their depths
 SURE = 6.0  # standard deviations by which a break exceeds what noise explains
 WEAK = 4.0  # and where it continues one that does
@@ -23,6 +24,7 @@ HALF, QUARTER = 7, 3  # sectors of a window that fits on one side of any straigh
 STRAY = 0.7  # spacings, beside `_STRAY_SIGMAS` deviations, off all planes around: a point floating alone
 _STRAY_SIGMAS = 4.0
 PREFER = (0.0, 0.1, 0.3)
+_FEWEST_LEVELS = 64
 _CLOSE = 3.0  # spacings, and standard deviations, within which neighbours hold a pixel
 
 
@@ -42,15 +44,30 @@ class Outline:
     strength: np.ndarray
 
 
-def outline_kinds(raster: Raster, num_points: int) -> Outline:
-    """Find the outlines of a raster.
+def outline_kinds(raster: Raster, xyz: np.ndarray) -> Outline:
+    """Find the outlines of a cloud in a view.
+
+    Each pixel is given a plane of its own side of whatever edge is near. Where the planes of two neighbours (of 4, a
+    hole of up to `BRIDGE` pixels between them) leave a step that neither plane's slope explains, the near point is
+    OCCLUDING and the far one OCCLUDED. Pixels beside a wider hole are BOUNDARY.
 
     Parameters
     ----------
     raster : Raster
-    num_points : int
-        Of how many points it was made.
+    xyz : (N, 3) float64
+        The points it was made of.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from edgel.raster import orthographic
+    >>> x, y = np.meshgrid(np.arange(30.0), np.arange(20.0))
+    >>> stair = np.c_[x.ravel(), y.ravel(), 10.0 * (x.ravel() < 15)]
+    >>> found = outline_kinds(orthographic(stair, np.array([0, 0, -1])), stair)
+    >>> [sorted(set(stair[(found.kind & side) > 0, 0].tolist())) for side in (EdgeKind.OCCLUDING, EdgeKind.OCCLUDED)]
+    [[14.0], [15.0]]
     """
+    num_points = len(xyz)
     perspective = raster.viewpoint is not None
     spacing = raster.spacing
     noise = noise_level(raster)
@@ -61,7 +78,8 @@ def outline_kinds(raster: Raster, num_points: int) -> Outline:
     for _ in range(2):  # once more without the pixels that nothing around predicts
         planes = local_planes(depth, noise, perspective, reach)
         depth = np.where(np.abs(depth - planes[..., 0]) > planes[..., 4] + STRAY * spacing, np.nan, depth)
-    step, side = depth_steps(depth, planes, spacing, perspective)
+    least = np.maximum(STEP * spacing, LEVELS * _by_pixel(raster, level_gaps(xyz, raster.direction)))
+    step, side = depth_steps(depth, planes, spacing, least, perspective)
     chained = without_specks(hysteresis(step, WEAK / SURE, 1.0))
     kind = np.where(chained, side, 0).astype(np.uint8)
     rim = beside_void(raster.depth) & held
@@ -128,12 +146,39 @@ def local_planes(depth: np.ndarray, noise: np.ndarray, perspective: bool, reach:
     return planes
 
 
+def level_gaps(xyz: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """How far apart the levels are that a sensor rounds depths to, at each point; (N,) float64.
+
+    Structured light and stereo give the coordinate along the optical axis in levels that lie farther apart with the
+    distance. Where coordinates are not rounded, levels are as close as points are many.
+    """
+    along = xyz[:, np.argmax(np.abs(direction))]
+    levels, which = np.unique(along, return_inverse=True)
+    if len(levels) < _FEWEST_LEVELS:  # floors, not rounding
+        return np.zeros(len(xyz))
+    places = np.arange(len(levels))
+    low, high = np.maximum(places - 2, 0), np.minimum(places + 2, len(levels) - 1)
+    return ((levels[high] - levels[low]) / (high - low))[which]
+
+
+def _by_pixel(raster: Raster, values: np.ndarray) -> np.ndarray:
+    return np.where(raster.index >= 0, values[raster.index], np.nan)
+
+
 def depth_steps(
-    depth: np.ndarray, planes: np.ndarray, spacing: np.ndarray, perspective: bool
+    depth: np.ndarray, planes: np.ndarray, spacing: np.ndarray, least: np.ndarray, perspective: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Compare each pixel's plane with those of its 4 neighbours, halfway between."""
+    """Compare each pixel's plane with those of its 4 neighbours.
+
+    Returns
+    -------
+    (H, W) float64
+        The largest step, in multiples of the least that counts.
+    (H, W) uint8
+        `EdgeKind` flag of the side that the pixel lies on.
+    """
     step, side = np.zeros(depth.shape), np.zeros(depth.shape, np.uint8)
-    run_slices(_steps, len(depth), depth, planes, spacing, perspective, step, side, size=32)
+    run_slices(_steps, len(depth), depth, planes, spacing, least, perspective, step, side, size=32)
     return step, side
 
 
@@ -284,7 +329,7 @@ def _planes(start, stop, depth, noise, perspective, dr, dc, sector, planes):
 
 
 @kernel
-def _steps(start, stop, depth, planes, spacing, perspective, step, side):
+def _steps(start, stop, depth, planes, spacing, least, perspective, step, side):
     height, width = depth.shape
     for row in range(start, stop):
         for col in range(width):
@@ -311,7 +356,7 @@ def _steps(start, stop, depth, planes, spacing, perspective, step, side):
                 sign = 1.0 if gap > 0 else -1.0
                 jump = sign * gap - max(sign * here, -sign * there, 0.0)
                 near = min(spacing[row, col], spacing[r, c])
-                sure = jump / max(STEP * near, SURE * math.sqrt(p[3] + q[3]))
+                sure = jump / max(least[row, col], least[r, c], SURE * math.sqrt(p[3] + q[3]))
                 sure = min(sure, abs(gap) / (GAP * near))
                 if sure > step[row, col]:
                     step[row, col] = sure
