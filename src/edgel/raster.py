@@ -17,7 +17,7 @@ from edgel.parallel import kernel
 FRAME = 4  # empty pixels around a projection, so that the cloud's rim lies beside a void
 _SAMPLE = 2000  # points at which the evenness of the image is looked at
 _RINGS = 0.25  # nearest neighbours this much flatter than 45 degrees lie on scan lines along the rows
-_EVEN = 0.75  # nearest neighbours of a grid are 1 spacing away, those of random points 0.5
+_GRID, _EVEN = 0.9, 0.75  # nearest neighbours of a grid are 1 spacing away, those of random points 0.5
 _LOOSE = 1.3  # pixels of random points are this much larger than their spacing, or a third would be empty
 _MOST_PIXELS = 50  # for each point
 
@@ -65,9 +65,7 @@ class Raster:
         return side * self.depth if self.viewpoint is not None else np.where(np.isnan(self.depth), np.nan, side)
 
 
-def organized(
-    xyz: np.ndarray, rows: np.ndarray, shape: tuple[int, int], viewpoint: np.ndarray | None = None
-) -> Raster:
+def organized(xyz: np.ndarray, rows: np.ndarray, shape: tuple[int, int], viewpoint: np.ndarray | None = None) -> Raster:
     """See an organized cloud as its sensor did.
 
     Whether the rays leave the viewpoint or are parallel is read off the cloud: whichever makes the steps from pixel to
@@ -178,7 +176,12 @@ def _axes(direction: np.ndarray, up: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _rastered(
-    xyz: np.ndarray, picture: np.ndarray, depth: np.ndarray, method: str, viewpoint: np.ndarray | None, forward: np.ndarray
+    xyz: np.ndarray,
+    picture: np.ndarray,
+    depth: np.ndarray,
+    method: str,
+    viewpoint: np.ndarray | None,
+    forward: np.ndarray,
 ) -> Raster:
     """Let each pixel show the nearest of its points."""
     low, high = picture.min(axis=0), picture.max(axis=0)
@@ -229,8 +232,11 @@ def image_pitch(picture: np.ndarray) -> tuple[float, float]:
     right, down = np.median(step, axis=0)
     if down < _RINGS * right and right < side:
         return float(right), float(side * side / right)
-    even = np.median(np.hypot(*step.T)) > _EVEN * side
-    return (side, side) if even else (_LOOSE * side, _LOOSE * side)
+    nearest = float(np.median(np.hypot(*step.T)))
+    if nearest > _GRID * side:  # exactly its step: pixels a little smaller or larger would leave out whole columns
+        return nearest, nearest
+    side *= 1.0 if nearest > _EVEN * side else _LOOSE
+    return side, side
 
 
 def _covered(picture: np.ndarray) -> float:
@@ -239,13 +245,11 @@ def _covered(picture: np.ndarray) -> float:
     area = float(extent.prod()) or float(extent.max()) ** 2 / len(picture)
     for _ in range(4):  # a cloud that covers little of its box has more points in a cell, so cells may shrink
         cell = np.sqrt(8 * area / len(picture))
-        columns = int(extent[0] / cell) + 1
         places = np.floor((picture - low) / cell).astype(np.int64)
-        counts = np.bincount(places[:, 1] * columns + places[:, 0]) if columns < 1e7 else np.array([8])
-        area = float(np.count_nonzero(counts) * cell**2)
+        counts = np.unique(places[:, 1] * (places[:, 0].max() + 1) + places[:, 0], return_counts=True)[1]
+        area = float(len(counts) * cell**2)
         # Cells on the rim are only half full.
-        full = counts[counts > 0]
-        area *= float(np.mean(np.minimum(full / np.median(full), 1.0)))
+        area *= float(np.mean(np.minimum(counts / np.median(counts), 1.0)))
     return area
 
 

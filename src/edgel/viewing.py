@@ -70,6 +70,8 @@ def choose_method(cloud: Cloud, xyz: np.ndarray, viewpoint: np.ndarray | None = 
                 return Viewing(raster.method, f"{share:.0%} of the points show from the viewpoint", raster)
     best, most = None, -1.0
     for direction in _directions(xyz):
+        if viewpoint is not None and direction @ (xyz.mean(axis=0) - viewpoint) < 0:
+            direction = -direction
         raster = orthographic(xyz, direction)
         share = shown(raster, xyz)
         if share > most + 1e-3:  # earlier candidates, the view from above first, win a draw
