@@ -18,7 +18,7 @@ LEVELS = 3.0  # and least break in levels to which the sensor rounds depths
 GAP = 2.0  # spacings: least difference of their depths
 SURE = 6.0  # standard deviations by which a break exceeds what noise explains
 WEAK = 2 / 3  # of all that, where a break continues a sure one
-CHAIN = 8  # pixels: shorter chains, both sides together, are specks
+CHAIN = 4  # times the reach of the windows, in pixels: chains of both sides that are shorter are specks
 FINEST = 0.02  # spacings: least noise; without any, rounding would choose among windows
 BRIDGE = 2  # pixels: a hole no wider is bridged
 STRAY = 0.7  # spacings, beside 4 deviations, off all planes around: a point floating alone
@@ -79,7 +79,7 @@ def outline_kinds(raster: Raster, xyz: np.ndarray) -> Outline:
     planes = local_planes(depth, noise, perspective, reach)
     least = np.maximum(STEP * spacing, LEVELS * _by_pixel(raster, level_gaps(xyz, raster.direction)))
     step, side = depth_steps(depth, planes, spacing, least, perspective)
-    broken = without_specks(hysteresis(step, WEAK, 1.0))
+    broken = without_specks(hysteresis(step, WEAK, 1.0), CHAIN * reach)
     kind = np.where(broken, side, 0) | np.where(rim, EdgeKind.BOUNDARY, 0)
     strength = np.where(rim, 1.0, np.where(broken, step / (1 + step), 0.0))
     shown = raster.index >= 0
@@ -126,10 +126,10 @@ def depth_steps(
     return step, side
 
 
-def without_specks(edges: np.ndarray) -> np.ndarray:
-    """Drop chains (of 8-neighbours) of fewer than `CHAIN` pixels."""
+def without_specks(edges: np.ndarray, least: int) -> np.ndarray:
+    """Drop chains (of 8-neighbours) of fewer than `least` pixels."""
     kept = np.zeros(edges.shape, np.bool_)
-    _long_chains(np.pad(edges, 1), CHAIN, kept)
+    _long_chains(np.pad(edges, 1), least, kept)
     return kept
 
 
