@@ -224,3 +224,73 @@ def hinge(points, spacing, u, v, normal):
                 best = (left, abs(math.atan(f[1] + f[3]) - math.atan(f[1] - f[3])), o)
     left, angle, o = best
     return angle if angle > math.radians(30) and abs(o) * radius < 0.35 * spacing and left < smooth else 0.0
+
+
+def nearest_points(pixels, depth, points):
+    """Row of the point each pixel shows: the nearest, of equally near ones that of smallest coordinates."""
+    shown = {}
+    for p, pixel in enumerate(pixels):
+        if pixel not in shown or (depth[p], *points[p]) < (depth[shown[pixel]], *points[shown[pixel]]):
+            shown[pixel] = p
+    return shown
+
+
+def held(depth, close):
+    """Pixels that at least 4 of their 24 neighbours hold: within `close`, or 3 median steps of the window more."""
+    kept = np.full(depth.shape, np.nan)
+    for row, col in np.argwhere(~np.isnan(depth)):
+        window = depth[max(row - 2, 0) : row + 3, max(col - 2, 0) : col + 3]
+        away = np.abs(window - depth[row, col])
+        steps = [np.abs(np.diff(window, axis=axis)) for axis in (0, 1)]
+        slack = 3 * max((np.median(s[~np.isnan(s)]) for s in steps if not np.isnan(s).all()), default=0.0)
+        if max(np.sum(away <= close[row, col]), np.sum(away <= close[row, col] + slack)) >= 5:
+            kept[row, col] = depth[row, col]
+    return kept
+
+
+def facet(depth, noise, row, col, reach):
+    """The plane of one pixel (parallel rays): least squares in every window, and the window that fits best."""
+    best, answer = math.inf, (depth[row, col], 0.0, 0.0, noise**2)
+    around = [
+        (dr, dc)
+        for dr in range(-reach, reach + 1)
+        for dc in range(-reach, reach + 1)
+        if 0 < dr * dr + dc * dc <= (reach + 0.3) ** 2
+    ]
+    for sectors, extra in ((16, 0.0), (7, 0.1), (3, 0.3)):
+        for first in range(1 if sectors == 16 else 16):
+            rows = [(1.0, 0.0, 0.0, 0.0)]
+            for dr, dc in around:
+                r, c = row + dr, col + dc
+                sector = math.floor(math.atan2(dr, dc) / (2 * math.pi) * 16 + 1e-9) % 16
+                inside = 0 <= r < depth.shape[0] and 0 <= c < depth.shape[1] and not math.isnan(depth[r, c])
+                if inside and (sector - first) % 16 < sectors:
+                    rows.append((1.0, dr, dc, depth[r, c] - depth[row, col]))
+            a, u = np.array(rows)[:, :3], np.array(rows)[:, 3]
+            if len(rows) < 5 or np.linalg.matrix_rank(a) < 3:
+                continue
+            plane = np.linalg.solve(a.T @ a, a.T @ u)
+            leverage = np.linalg.inv(a.T @ a)[0, 0]
+            spread = max((np.sum((a @ plane - u) ** 2) + 4 * noise**2) / (len(rows) + 1), noise**2)
+            score = spread * (1 + extra + leverage) + plane[0] ** 2 / 4
+            if score < best:
+                best, answer = score, (depth[row, col] + plane[0], plane[1], plane[2], spread * leverage)
+    return answer
+
+
+def beside_void(hole):
+    """Pixels next to a hole: squares of 3 pixels that are all hole, and what lies within two steps in it."""
+    height, width = hole.shape
+    void = np.zeros_like(hole)
+    for row in range(height - 2):
+        for col in range(width - 2):
+            if hole[row : row + 3, col : col + 3].all():
+                void[row : row + 3, col : col + 3] = True
+    for step in range(3):
+        grown = void.copy()
+        for row, col in np.argwhere(void):
+            for r, c in ((row - 1, col), (row + 1, col), (row, col - 1), (row, col + 1)):
+                if 0 <= r < height and 0 <= c < width:
+                    grown[r, c] = True
+        void = grown & (hole if step < 2 else ~hole)
+    return void

@@ -1,0 +1,224 @@
+"""Outlines seen from a view: rims against nothing, and the near and far side of every step in depth."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from edgel.canny import hysteresis
+from edgel.edges import EdgeKind
+from edgel.facets import local_planes, noise_level, without_lonely
+from edgel.parallel import kernel, run_slices
+from edgel.raster import Raster
+
+STEP = 2.0  # spacings: least break of the surface between two pixels
+LEVELS = 3.0  # and least break in levels to which the sensor rounds depths
+GAP = 2.0  # spacings: least difference of their depths
+SURE = 6.0  # standard deviations by which a break exceeds what noise explains
+WEAK = 2 / 3  # of all that, where a break continues a sure one
+CHAIN = 4  # times the reach of the windows, in pixels: chains of both sides that are shorter are specks
+FINEST = 0.02  # spacings: least noise; without any, rounding would choose among windows
+BRIDGE = 2  # pixels: a hole no wider is bridged
+STRAY = 0.7  # spacings, beside 4 deviations, off all planes around: a point floating alone
+_FEWEST_LEVELS = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """What of a cloud is an outline.
+
+    Attributes
+    ----------
+    kind : (N,) uint8
+        `EdgeKind` flags BOUNDARY, OCCLUDING, OCCLUDED of each point.
+    strength : (N,) float64
+        In (0, 1] where there is a flag, else 0.
+    """
+
+    kind: np.ndarray
+    strength: np.ndarray
+
+
+def outline_kinds(raster: Raster, xyz: np.ndarray) -> Outline:
+    """Find the outlines of a cloud in a view.
+
+    Each pixel is given a plane of its own side of whatever edge is near. Where the planes of two neighbours (of 4, a
+    hole of up to `BRIDGE` pixels between them) leave a step that neither plane's slope explains, the near point is
+    OCCLUDING and the far one OCCLUDED. Pixels beside a wider hole are BOUNDARY.
+
+    Parameters
+    ----------
+    raster : Raster
+    xyz : (N, 3) float64
+        The points it was made of.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from edgel.raster import orthographic
+    >>> x, y = np.meshgrid(np.arange(30.0), np.arange(20.0))
+    >>> stair = np.c_[x.ravel(), y.ravel(), 10.0 * (x.ravel() < 15)]
+    >>> found = outline_kinds(orthographic(stair, np.array([0, 0, -1])), stair)
+    >>> [sorted(set(stair[(found.kind & side) > 0, 0].tolist())) for side in (EdgeKind.OCCLUDING, EdgeKind.OCCLUDED)]
+    [[14.0], [15.0]]
+    """
+    perspective = raster.viewpoint is not None
+    spacing = raster.spacing
+    noise = np.fmax(noise_level(raster), FINEST * spacing)
+    depth = without_lonely(raster.depth, spacing, noise)
+    rim = beside_void(raster.depth) & ~np.isnan(depth)
+    # Noise is averaged over as few pixels as it allows: edges are seldom straight for long.
+    known = ~np.isnan(spacing)
+    level = float(np.median(noise[known] / spacing[known])) if known.any() else 0.0
+    reach = 3 if level < 0.15 else 4 if level < 0.5 else 5
+    planes = local_planes(depth, noise, perspective, reach)
+    astray = np.abs(raster.depth - planes[..., 0]) > planes[..., 4] + STRAY * spacing
+    depth = np.where(astray, np.nan, depth)
+    planes = local_planes(depth, noise, perspective, reach)
+    least = np.maximum(STEP * spacing, LEVELS * _by_pixel(raster, level_gaps(xyz, raster.direction)))
+    step, side = depth_steps(depth, planes, spacing, least, perspective)
+    broken = without_specks(hysteresis(step, WEAK, 1.0), CHAIN * reach)
+    kind = np.where(broken, side, 0) | np.where(rim, EdgeKind.BOUNDARY, 0)
+    strength = np.where(rim, 1.0, np.where(broken, step / (1 + step), 0.0))
+    shown = raster.index >= 0
+    flags, strengths = np.zeros(len(xyz), np.uint8), np.zeros(len(xyz))
+    flags[raster.index[shown]], strengths[raster.index[shown]] = kind[shown], strength[shown]
+    return Outline(flags, strengths)
+
+
+def level_gaps(xyz: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """How far apart the levels are that a sensor rounds depths to, at each point; (N,) float64.
+
+    Structured light and stereo give the coordinate along the optical axis in levels that lie farther apart with the
+    distance. Where coordinates are not rounded, levels are as close as points are many.
+    """
+    along = xyz[:, np.argmax(np.abs(direction))]
+    levels, which = np.unique(along, return_inverse=True)
+    if len(levels) < _FEWEST_LEVELS:  # floors, not rounding
+        return np.zeros(len(xyz))
+    places = np.arange(len(levels))
+    low, high = np.maximum(places - 2, 0), np.minimum(places + 2, len(levels) - 1)
+    return ((levels[high] - levels[low]) / (high - low))[which]
+
+
+def _by_pixel(raster: Raster, values: np.ndarray) -> np.ndarray:
+    image = np.full(raster.shape, np.nan)
+    image[raster.index >= 0] = values[raster.index[raster.index >= 0]]
+    return image
+
+
+def depth_steps(
+    depth: np.ndarray, planes: np.ndarray, spacing: np.ndarray, least: np.ndarray, perspective: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Compare each pixel's plane with those of its 4 neighbours.
+
+    Returns
+    -------
+    (H, W) float64
+        The largest step, in multiples of the least that counts.
+    (H, W) uint8
+        `EdgeKind` flag of the side that the pixel lies on.
+    """
+    step, side = np.zeros(depth.shape), np.zeros(depth.shape, np.uint8)
+    run_slices(_steps, len(depth), depth, planes, spacing, least, perspective, step, side, size=32)
+    return step, side
+
+
+def without_specks(edges: np.ndarray, least: int) -> np.ndarray:
+    """Drop chains (of 8-neighbours) of fewer than `least` pixels."""
+    kept = np.zeros(edges.shape, np.bool_)
+    _long_chains(np.pad(edges, 1), least, kept)
+    return kept
+
+
+def beside_void(depth: np.ndarray) -> np.ndarray:
+    """Pixels next to a hole that is wider than `BRIDGE` pixels; (H, W) bool."""
+    hole = np.isnan(depth)
+    void = ~_shifted(~hole, 1)  # upper left pixels of the squares of side BRIDGE + 1 that are all hole
+    void[-BRIDGE:], void[:, -BRIDGE:] = False, False
+    void = _shifted(void, -1)
+    for _ in range(BRIDGE):  # squares leave the corners of a void out: give them back, but no cracks
+        void = _widened(void) & hole
+    return _widened(void) & ~hole
+
+
+def _shifted(mask: np.ndarray, way: int) -> np.ndarray:
+    """Whether any pixel of the square of side `BRIDGE` + 1 to the lower right is set (`way` -1: to the upper left)."""
+    for axis in (0, 1):
+        ahead = np.moveaxis(mask, axis, 0)[::way]
+        out = ahead.copy()
+        for shift in range(1, BRIDGE + 1):
+            out[:-shift] |= ahead[shift:]
+        mask = np.moveaxis(out[::way], 0, axis)
+    return mask
+
+
+def _widened(mask: np.ndarray) -> np.ndarray:
+    """Set the pixels above, below, left and right too."""
+    out = mask.copy()
+    out[1:] |= mask[:-1]
+    out[:-1] |= mask[1:]
+    out[:, 1:] |= mask[:, :-1]
+    out[:, :-1] |= mask[:, 1:]
+    return out
+
+
+@kernel
+def _steps(start, stop, depth, planes, spacing, least, perspective, step, side):
+    height, width = depth.shape
+    for row in range(start, stop):
+        for col in range(width):
+            own = depth[row, col]
+            if math.isnan(own):
+                continue
+            p = planes[row, col]
+            for way in range(4):
+                dr, dc = (0, 1, 0, -1)[way], (1, 0, -1, 0)[way]
+                apart = 1
+                r, c = row + dr, col + dc
+                while apart <= BRIDGE and 0 <= r < height and 0 <= c < width and math.isnan(depth[r, c]):
+                    r, c, apart = r + dr, c + dc, apart + 1
+                if not (0 <= r < height and 0 <= c < width) or math.isnan(depth[r, c]):
+                    continue
+                q = planes[r, c]
+                here = apart * (p[1] * dr + p[2] * dc)
+                there = -apart * (q[1] * dr + q[2] * dc)
+                if perspective:
+                    here = here / max(1 - here / p[0], 0.1)
+                    there = there / max(1 - there / q[0], 0.1)
+                gap = q[0] - p[0]
+                # Seen from either pixel: planes that merely cross between the two, at a fold, are no step.
+                sign = 1.0 if gap > 0 else -1.0
+                jump = sign * gap - max(sign * here, -sign * there, 0.0)
+                near = min(spacing[row, col], spacing[r, c])
+                sure = jump / max(least[row, col], least[r, c], SURE * math.sqrt(p[3] + q[3]))
+                sure = min(sure, abs(gap) / (GAP * near))
+                if sure > step[row, col]:
+                    step[row, col] = sure
+                    side[row, col] = 2 if gap > 0 else 4
+
+
+@kernel
+def _long_chains(padded, least, kept):
+    """Copy the chains of at least `least` pixels; `padded` is emptied."""
+    width = padded.shape[1]
+    flat, chain = padded.ravel(), np.empty(padded.size, np.int64)
+    for first in range(flat.size):
+        if not flat[first]:
+            continue
+        flat[first] = False
+        chain[0], done, count = first, 0, 1
+        while done < count:
+            for r in range(-1, 2):
+                for c in range(-1, 2):
+                    place = chain[done] + r * width + c
+                    if flat[place]:
+                        flat[place] = False
+                        chain[count] = place
+                        count += 1
+            done += 1
+        if count >= least:
+            for i in range(count):
+                kept[chain[i] // width - 1, chain[i] % width - 1] = True
