@@ -19,7 +19,7 @@ LAYERS = [
     {"kdtree"},
     {"neighbors"},
     {"normals", "canny"},
-    {"project", "crease", "boundary", "edges"},
+    {"project", "crease", "boundary", "color", "edges"},
     {"metrics"},
     {"paper"},
     {"detect"},
