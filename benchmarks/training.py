@@ -24,13 +24,21 @@ def scene(seed: int) -> Scene:
         except ValueError:  # cells that touch along an edge only are no surface
             continue
     points = np.exp(rng.uniform(np.log(4000), np.log(22000)))
-    noise = [0.0, rng.uniform(0, 0.15), rng.uniform(0.15, 0.5), rng.uniform(0.5, 1.1)][rng.choice(4, p=[0.3, 0.2, 0.3, 0.2])]
-    degraded = {"noise": noise, "outliers": [0.0, 0.01, 0.05][rng.choice(3, p=[0.75, 0.15, 0.1])], "seed": int(rng.integers(2**31))}
+    noise = [0.0, rng.uniform(0, 0.15), rng.uniform(0.15, 0.5), rng.uniform(0.5, 1.1)][
+        rng.choice(4, p=[0.3, 0.2, 0.3, 0.2])
+    ]
+    degraded = {
+        "noise": noise,
+        "outliers": [0.0, 0.01, 0.05][rng.choice(3, p=[0.75, 0.15, 0.1])],
+        "seed": int(rng.integers(2**31)),
+    }
     if rng.random() < 0.35:
         direction = rng.standard_normal(3)
         projection = synth.PROJECTIONS[rng.integers(3)]
         spacing = np.sqrt(solid.area / 2.2 / points)
-        return synth.view(solid, projection=projection, spacing=spacing, direction=direction, roll=rng.uniform(-3, 3), **degraded)
+        return synth.view(
+            solid, projection=projection, spacing=spacing, direction=direction, roll=rng.uniform(-3, 3), **degraded
+        )
     pattern = rng.choice(synth.PATTERNS, p=[0.17, 0.17, 0.14, 0.14, 0.38])
     return synth.sample(solid, pattern=str(pattern), spacing=np.sqrt(solid.area / points), **degraded)
 

@@ -294,3 +294,49 @@ def beside_void(hole):
                     grown[r, c] = True
         void = grown & (hole if step < 2 else ~hole)
     return void
+
+
+def biweight(points):
+    """Weights of neighbours, relative to the point, that vanish at the farthest."""
+    squared = (points**2).sum(axis=1)
+    return (1 - squared / squared.max()) ** 2
+
+
+def color_gradient(points, normal, colors):
+    """Di Zenzo's gradient at the origin times the radius, and its direction: per channel a plane, then the tensor."""
+    u = np.linalg.svd(normal[None])[2][1]
+    v = np.cross(normal, u)
+    root = np.sqrt(biweight(points))
+    design = np.column_stack([np.ones(len(points)), points @ u, points @ v])
+    slopes = np.linalg.lstsq(design * root[:, None], colors * root[:, None], rcond=None)[0][1:].T
+    values, vectors = np.linalg.eigh(slopes.T @ slopes)
+    direction = vectors[:, 1]
+    changes = slopes @ direction
+    direction = direction * np.sign(changes[np.argmax(np.abs(changes))])
+    radius = np.sqrt((points**2).sum(axis=1).max())
+    return math.sqrt(values[1]) * radius, direction[0] * u + direction[1] * v
+
+
+def color_peak(points, values, direction):
+    """Where along `direction` a parabola through the gradient's values has its peak, in radii; inf without one."""
+    radius = np.sqrt((points**2).sum(axis=1).max())
+    c, b, a = np.polyfit(points @ direction / radius, values, 2, w=np.sqrt(biweight(points)))
+    return -b / (2 * c) if a > 0 and -c > 0.5 * a else math.inf
+
+
+def thin_abreast(points, across, spacing, offsets):
+    """Rows that stay when one after the other, nearest to the edge first, drops those abreast of it."""
+    ranked = sorted(
+        range(len(points)), key=lambda i: (round(abs(offsets[i]) * 1e6), offsets[i] > 0, *points[i].tolist())
+    )
+    kept = []
+    for i in ranked:
+        free = True
+        for j in kept:
+            side = (points[j] - points[i]) @ across[i]
+            along = math.sqrt(max(((points[j] - points[i]) ** 2).sum() - side**2, 0))
+            if along < 0.75 * spacing[i] and 0.25 * spacing[i] < abs(side) < 1.5 * spacing[i]:
+                free = False
+        if free:
+            kept.append(i)
+    return kept

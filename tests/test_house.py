@@ -19,7 +19,7 @@ LAYERS = [
     {"kdtree"},
     {"neighbors"},
     {"normals", "canny"},
-    {"project", "crease", "boundary", "edges", "raster"},
+    {"project", "evidence", "edges", "raster", "color"},
     {"facets", "viewing"},
     {"outline"},
     {"metrics"},

@@ -9,15 +9,17 @@ import numpy as np
 
 from edgel import paper
 from edgel.cloud import as_cloud, as_vector, check_points
-from edgel.edges import EdgeKind, Edges, as_kinds, one_face
+from edgel.color import color_channels, color_edges
+from edgel.edges import EdgeKind, Edges, as_kinds
 from edgel.evidence import crease_probability, examine, outline_probability, screen, survey
 from edgel.evidence.faces import faces
 from edgel.kdtree import build_index
 from edgel.normals import check_num_neighbors, plane_fits, towards
+from edgel.outline import outline_kinds
 from edgel.stages import Stages
+from edgel.viewing import METHODS, look
 
 PRESETS = ("default", "paper")
-METHODS = ("auto", "surface", "organized", "orthographic", "pinhole", "spherical")
 DEFAULT_KINDS = EdgeKind.BOUNDARY | EdgeKind.OCCLUDING | EdgeKind.OCCLUDED | EdgeKind.CREASE
 CREASE = 0.45  # least probability of a crease
 OUTLINE = 0.5  # least probability that the surface ends
@@ -40,7 +42,7 @@ def detect(
     points : (N, 3) or (H, W, 3) array_like, Cloud, or an object that carries points
         Points with a NaN or infinite coordinate are left out and counted.
     preset : {"default", "paper"}
-        "default" tests every point for a crease or a boundary among its neighbours in 3D, from any side. "paper" is the
+        "default" looks at every point's neighbours in 3D, and at the cloud as its sensor saw it where one view shows it. "paper" is the
         published method as it stands, with its defaults: Canny on a projection along Z. `edgel.paper.detect` has its
         options.
     kinds : EdgeKind, or str, or iterable of str
@@ -91,14 +93,16 @@ def detect(
         if viewpoint is not None:
             raise ValueError("viewpoint: the paper turns normals by D > 0; leave it out, or use the default preset")
         return paper.detect(points, num_neighbors=num_neighbors, progress=progress)
-    if method not in ("auto", "surface"):  # the one place where the other methods come in
-        raise ValueError(f"method: {method!r} is not there yet; use 'surface', which takes any cloud, or 'auto'")
     cloud = as_cloud(points)
     viewpoint = cloud.viewpoint if viewpoint is None else as_vector(viewpoint, "viewpoint")
     checked = check_points(cloud)
+    channels = color_channels(cloud) if EdgeKind.COLOR in kinds else None
+    if EdgeKind.COLOR in kinds and channels is None:
+        raise ValueError("kinds: color edges need red, green and blue or an intensity, and the cloud carries neither")
     k = check_num_neighbors(num_neighbors, len(checked.xyz))
 
     stages = Stages(progress)
+    found = Marks(len(checked.xyz))
     with stages("index"):
         index = build_index(checked.xyz)
     with stages("survey"):
@@ -106,32 +110,60 @@ def detect(
         if not surveyed.has_surface:
             raise ValueError("points: all lie on one line or spot, so there is no surface whose edges could be found")
         rows = screen(index, surveyed)
+    with stages("view"):
+        viewing = look(cloud, checked.xyz, checked.rows, method, viewpoint)
     with stages("evidence"):
         evidence = examine(index, surveyed, checked.xyz[rows])
     with stages("decision"):
-        crease, outline = crease_probability(evidence), outline_probability(evidence)
-        kind = np.where(crease >= CREASE, EdgeKind.CREASE, 0) | np.where(outline >= OUTLINE, EdgeKind.BOUNDARY, 0)
-        found = np.flatnonzero(kind)
+        sure = crease_probability(evidence)
+        found.mark(rows, EdgeKind.CREASE, np.where(sure >= CREASE, sure, 0))
+        if viewing.raster is None:
+            ends = outline_probability(evidence)
+            found.mark(rows, EdgeKind.BOUNDARY, np.where(ends >= OUTLINE, ends, 0))
+        else:
+            outline = outline_kinds(viewing.raster, checked.xyz)
+            found.mark(np.arange(len(checked.xyz)), outline.kind, outline.strength)
+    if EdgeKind.COLOR in kinds:
+        with stages("color"):
+            contrast = color_edges(
+                index, checked.xyz, surveyed.normals_in_order(index), channels[checked.rows]
+            ).strength
+            found.mark(np.arange(len(checked.xyz)), EdgeKind.COLOR, contrast)
     with stages("faces"):
-        at, rows, kind = checked.xyz[rows[found]], rows[found], kind[found].astype(np.uint8)
-        sides = faces(evidence.take(found), at, viewpoint)
+        edge = np.flatnonzero(found.kind & int(kinds))
+        at = checked.xyz[edge]
         planes = towards(plane_fits(index, at, k), at, viewpoint)
-        hinge = ((kind & EdgeKind.CREASE) > 0) & (sides.convex != 0)
-        normals = np.where(hinge[:, None, None], sides.normals, one_face(planes.normals)["normals"])
+        crease = np.flatnonzero(sure >= CREASE)
+        sides = faces(evidence.take(crease), checked.xyz[rows[crease]], viewpoint).spread(
+            edge, rows[crease], at, planes.normals
+        )
     return Edges(
-        index=checked.rows[rows],
-        kind=kind,
-        strength=np.maximum(crease, outline)[found],
-        position=np.where(hinge[:, None], sides.position, at),
-        direction=np.where(hinge[:, None], sides.direction, np.nan),
-        normals=normals,
-        angle=np.where(hinge, sides.angle, np.nan),
-        convex=np.where(hinge, sides.convex, 0).astype(np.int8),
+        index=checked.rows[edge],
+        kind=found.kind[edge] & np.uint8(kinds),
+        strength=found.strength[edge],
+        position=sides.position,
+        direction=sides.direction,
+        normals=sides.normals,
+        angle=sides.angle,
+        convex=sides.convex,
         num_points=checked.num_input,
         num_dropped=checked.num_dropped,
         preset=preset,
-        method="surface",
-        reason="it takes any cloud, from any side" if method == "auto" else "asked for",
+        method=viewing.method,
+        reason=viewing.reason,
         parameters={"num_neighbors": k},
         seconds=stages.seconds,
-    ).only(kinds)
+    )
+
+
+class Marks:
+    """The edge points found so far: kinds (N,) uint8 and strength (N,) of the most marked kind."""
+
+    def __init__(self, count: int) -> None:
+        self.kind = np.zeros(count, np.uint8)
+        self.strength = np.zeros(count)
+
+    def mark(self, rows: np.ndarray, kind: EdgeKind | np.ndarray, strength: np.ndarray) -> None:
+        """Add a kind (one, or (M,) flags) at rows (M,) whose strength (M,) is above 0."""
+        self.kind[rows] |= np.where(strength > 0, kind, 0).astype(np.uint8)
+        self.strength[rows] = np.maximum(self.strength[rows], strength)

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from edgel.cloud import Cloud
-from edgel.raster import Raster, orthographic, pinhole, spherical
+from edgel.raster import Raster, organized, orthographic, pinhole, spherical
+
+METHODS = ("auto", "surface", "organized", "orthographic", "pinhole", "spherical")
 
 SHOWN = 0.97  # least share of the points that one view has to show
 DEPTH = 3.0  # spacings behind the nearest point of its pixel within which a point still shows
@@ -68,6 +70,50 @@ def choose_method(cloud: Cloud, xyz: np.ndarray, viewpoint: np.ndarray | None = 
             share = shown(raster, xyz)
             if share >= SHOWN:
                 return Viewing(raster.method, f"{share:.0%} of the points show from the viewpoint", raster)
+    best, most = _best_direction(xyz, viewpoint)
+    if best is not None and most >= SHOWN:
+        x, y, z = best.direction + 0.0
+        return Viewing("orthographic", f"{most:.0%} of the points show along ({x:.2g}, {y:.2g}, {z:.2g})", best)
+    return Viewing("surface", f"no one view shows all: {most:.0%} of the points at most")
+
+
+def look(cloud: Cloud, xyz: np.ndarray, rows: np.ndarray, method: str, viewpoint: np.ndarray | None) -> Viewing:
+    """Look at a cloud in the way that is asked for, or ("auto") the best one; the raster is there unless "surface".
+
+    Parameters
+    ----------
+    cloud : Cloud
+    xyz : (N, 3) float64
+        Its finite points.
+    rows : (N,) int64
+        Their rows in the cloud.
+    method : str
+        One of `METHODS`.
+    viewpoint : (3,) float64 or None
+
+    Raises
+    ------
+    ValueError
+        If the cloud lacks what the method needs.
+    """
+    viewing = choose_method(cloud, xyz, viewpoint) if method == "auto" else Viewing(method, "asked for")
+    if viewing.raster is not None or viewing.method == "surface":
+        return viewing
+    if viewing.method == "orthographic":
+        raster, _ = _best_direction(xyz, viewpoint)
+    elif viewing.method == "organized":
+        if cloud.shape is None or min(cloud.shape) < 2:
+            raise ValueError("method: 'organized' needs points in a grid, (H, W, 3); use 'auto' for a list of points")
+        raster = organized(xyz, rows, cloud.shape, viewpoint)
+    else:
+        if viewpoint is None:
+            raise ValueError(f"method: {method!r} needs to know where the sensor was; give viewpoint, or use 'auto'")
+        raster = (pinhole if viewing.method == "pinhole" else spherical)(xyz, viewpoint)
+    return Viewing(viewing.method, viewing.reason, raster)
+
+
+def _best_direction(xyz: np.ndarray, viewpoint: np.ndarray | None) -> tuple[Raster | None, float]:
+    """Return the orthographic view that shows most, and the share of the points that it shows."""
     best, most = None, -1.0
     for direction in _directions(xyz):
         if viewpoint is not None and direction @ (xyz.mean(axis=0) - viewpoint) < 0:
@@ -76,10 +122,7 @@ def choose_method(cloud: Cloud, xyz: np.ndarray, viewpoint: np.ndarray | None = 
         share = shown(raster, xyz)
         if share > most + 1e-3:  # earlier candidates, the view from above first, win a draw
             best, most = raster, share
-    if best is not None and most >= SHOWN:
-        x, y, z = best.direction + 0.0
-        return Viewing("orthographic", f"{most:.0%} of the points show along ({x:.2g}, {y:.2g}, {z:.2g})", best)
-    return Viewing("surface", f"no one view shows all: {most:.0%} of the points at most")
+    return best, most
 
 
 def shown(raster: Raster, xyz: np.ndarray) -> float:

@@ -47,6 +47,13 @@ class Survey:
     normals: np.ndarray
     features: np.ndarray
 
+    def normals_in_order(self, index: NeighborIndex) -> np.ndarray:
+        """Return the normals of the middle scale in the order of the input, (N, 3) float64; NaN where there is none."""
+        normals = np.empty((len(index), 3))
+        middle = self.normals[:, 1]
+        normals[index.order] = np.where(middle[:, 3:] > 0, middle[:, :3], np.nan)
+        return normals
+
     @property
     def has_surface(self) -> bool:
         """Whether any neighbourhood spans a plane."""

@@ -38,6 +38,24 @@ class Faces:
     angle: np.ndarray
     convex: np.ndarray
 
+    def spread(self, rows: np.ndarray, own: np.ndarray, xyz: np.ndarray, normals: np.ndarray) -> Faces:
+        """Put the faces found at the points `own` (M,) among the edge points `rows` (E,), both ascending.
+
+        Where none are known, the position is the point (E, 3) itself and the first normal that of its one plane (E, 3).
+        """
+        known = np.isin(own, rows) & (self.convex != 0)
+        at = np.searchsorted(rows, own[known])
+        whole = Faces(
+            position=xyz.copy(),
+            direction=np.full((len(rows), 3), np.nan),
+            normals=np.stack([normals, np.full_like(normals, np.nan)], axis=1),
+            angle=np.full(len(rows), np.nan),
+            convex=np.zeros(len(rows), np.int8),
+        )
+        for name in self.__dataclass_fields__:
+            getattr(whole, name)[at] = getattr(self, name)[known]
+        return whole
+
 
 def faces(evidence: Evidence, xyz: np.ndarray, viewpoint: np.ndarray | None) -> Faces:
     """Choose for each point (M, 3) the fit that places its edge best, and describe the edge by it.
