@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import accuracy
+import geometry
 import normals
 import published
 import report
@@ -56,6 +57,7 @@ def main() -> None:
     truth = options.data / "truth"
     results["published"] = published.published(truth) + published.measured(truth) if truth.is_dir() else []
     results["normals"] = normals.run()
+    results["geometry"] = geometry.run()
     if not options.no_speed:
         sizes = (10_000, 100_000) if options.quick else (10_000, 30_000, 100_000, 300_000, 647_984)
         slowest = 2.0 if options.quick else speed.SLOWEST

@@ -85,6 +85,9 @@ def _page(results: dict[str, Any], rows: list[Row]) -> Iterable[str]:
     yield _by(rows, "outliers", sorted({row["outliers"] for row in rows}), lambda row: row["noise"] <= 0.1)
     yield "## Negatives\n\nFound points farther than 2.5 spacings from any true edge, in 1000 points, on shapes without a crease (sphere, torus, wavy sheet, plane; their outlines and borders are true edges), by noise, without outliers."
     yield _negatives(rows)
+    if results.get("geometry"):
+        yield "## Geometry of creases\n\nMedian errors of edgel's creases (default) on scenes without noise: position in spacings; direction, the worse of both faces' normals, and the turn, in degrees; and for which share of the crease points they are known."
+        yield _geometry(results["geometry"])
     yield "## By the turn of the crease\n\nF1 at 1 spacing, all scenes of noise 0 without outliers, by the angle the surface turns (degrees)."
     yield _angles(rows)
     yield "![F1 against the turn of the crease](benchmarks/angle.png)"
@@ -110,6 +113,14 @@ def _page(results: dict[str, Any], rows: list[Row]) -> Iterable[str]:
     pictures = DOCS / "benchmarks" / "pictures.md"
     if pictures.exists():
         yield pictures.read_text().strip()
+
+
+def _geometry(rows: Sequence[Row]) -> str:
+    figures = ("position", "direction", "normals", "angle", "known")
+    middle = ["**median**", *(_cell(float(np.median([row[figure] for row in rows]))) for figure in figures)]
+    return _table(
+        ["scene", *figures], [middle, *([row["scene"], *(_cell(row[figure]) for figure in figures)] for row in rows)]
+    )
 
 
 def _parameters(tuning: dict[str, Any]) -> str:

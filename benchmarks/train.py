@@ -1,6 +1,6 @@
 """Train the trees of `edgel.evidence` on random scenes of `edgel.synth`, and write their weights into the package.
 
-Run: python benchmarks/train.py [--scenes 340] (an hour on two cores; features are kept in benchmarks/cache/training).
+Run: python benchmarks/train.py [--scenes 700] (an hour on two cores; features are kept in benchmarks/cache/training).
 Needs lightgbm. Nothing of the benchmark and no real data is seen in training: see `training.scene`.
 """
 
@@ -37,7 +37,7 @@ OPTIONS = {
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scenes", type=int, default=340)
+    parser.add_argument("--scenes", type=int, default=700)
     options = parser.parse_args()
     CACHE.mkdir(parents=True, exist_ok=True)
     with get_context("spawn").Pool(2, initializer=one_thread) as pool:

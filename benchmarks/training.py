@@ -85,7 +85,7 @@ def _solid(rng: np.random.Generator) -> Solid:
     return kinds[rng.choice(len(kinds), p=_SHARES)](rng)
 
 
-_SHARES = np.array([12, 12, 18, 12, 11, 6, 6, 5, 3, 5, 10]) / 100
+_SHARES = np.array([12, 12, 22, 18, 9, 4, 6, 4, 3, 4, 6]) / 100
 
 
 def _spread(rng: np.random.Generator, low: float, high: float, *size: int) -> np.ndarray:
@@ -147,7 +147,7 @@ def _prism(rng: np.random.Generator) -> Solid:
 
 
 def _fillets(rng: np.random.Generator, count: int) -> np.ndarray:
-    return np.where(rng.random(count) < rng.choice([0.0, 0.5, 0.9]), _spread(rng, 0.6, 9, count), 0)
+    return np.where(rng.random(count) < rng.choice([0.0, 0.5, 0.8, 1.0]), _spread(rng, 1, 7, count), 0)
 
 
 def _thin(rng: np.random.Generator) -> Solid:

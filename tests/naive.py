@@ -340,3 +340,44 @@ def thin_abreast(points, across, spacing, offsets):
         if free:
             kept.append(i)
     return kept
+
+
+def covariance_plane(points):
+    """Normal, surface variation, and middle over largest eigenvalue of the covariance of points."""
+    values, vectors = np.linalg.eigh(np.cov(points.T, bias=True))
+    return vectors[:, 0], values[0] / values.sum(), values[1] / values[2]
+
+
+def plane_residual(points):
+    """Sum of the squared distances of points to their best plane."""
+    return np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[2] ** 2
+
+
+def quadric_residual(points):
+    """Squares left by a quadric over the plane of the points, along its normal."""
+    normal = covariance_plane(points)[0]
+    u, v = np.linalg.svd(normal[None])[2][1:]
+    radius = np.linalg.norm(points, axis=1).max()
+    x, y, z = (points @ u / radius, points @ v / radius, points @ normal / radius)
+    terms = np.column_stack([np.ones_like(x), x, y, x * x, x * y, y * y])
+    left = z - terms @ np.linalg.lstsq(terms, z, rcond=None)[0]
+    return (left**2).sum() * radius**2
+
+
+def two_widest_sectors(xy):
+    """The two widest empty sectors between the directions of points in the plane, radians."""
+    xy = xy[(xy != 0).any(axis=1)]
+    angles = np.sort(np.arctan2(xy[:, 1], xy[:, 0]))
+    gaps = np.sort(np.diff(np.append(angles, angles[0] + 2 * np.pi)))
+    return gaps[-1], gaps[-2]
+
+
+def walk_trees(forest, row):
+    """Sum of the leaves that a row of features comes to, as a probability."""
+    total = 0.0
+    for root in forest.roots:
+        node = root
+        while forest.feature[node] >= 0:
+            node = node + 1 if row[forest.feature[node]] <= forest.threshold[node] else forest.right[node]
+        total += float(forest.threshold[node])
+    return 1 / (1 + np.exp(-total))

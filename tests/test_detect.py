@@ -198,4 +198,5 @@ def test_only_the_kinds_asked_for_are_answered():
         np.testing.assert_array_equal(found.index, every.index[of_kind])
         np.testing.assert_array_equal(edgel.detect(points, kinds=[name.upper()]).index, found.index)
         assert_well_formed(found, points)
-    assert len(edgel.detect(points, kinds="color")) == 0
+    with pytest.raises(ValueError, match="red, green and blue"):
+        edgel.detect(points, kinds="color")

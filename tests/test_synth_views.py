@@ -35,7 +35,7 @@ def off_block(places):
     tree = build_ray_tree(BLOCK)
     nearest = np.full(len(places), np.inf)
     for way in np.concatenate([np.eye(3), -np.eye(3)]):
-        found = cast(tree, places - 0.01 * way, np.broadcast_to(way, places.shape)).distance
+        found = cast(tree, places - 0.01 * way + 3e-7, np.broadcast_to(way, places.shape)).distance
         nearest = np.minimum(nearest, np.abs(found - 0.01))
     return nearest
 

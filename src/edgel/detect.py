@@ -42,7 +42,8 @@ def detect(
     points : (N, 3) or (H, W, 3) array_like, Cloud, or an object that carries points
         Points with a NaN or infinite coordinate are left out and counted.
     preset : {"default", "paper"}
-        "default" looks at every point's neighbours in 3D, and at the cloud as its sensor saw it where one view shows it. "paper" is the
+        "default" looks at every point's neighbours in 3D, and at the cloud as its sensor saw it where that is known.
+        "paper" is the
         published method as it stands, with its defaults: Canny on a projection along Z. `edgel.paper.detect` has its
         options.
     kinds : EdgeKind, or str, or iterable of str
@@ -123,7 +124,7 @@ def detect(
         else:
             outline = outline_kinds(viewing.raster, checked.xyz)
             found.mark(np.arange(len(checked.xyz)), outline.kind, outline.strength)
-    if EdgeKind.COLOR in kinds:
+    if EdgeKind.COLOR in kinds and channels is not None:
         with stages("color"):
             contrast = color_edges(
                 index, checked.xyz, surveyed.normals_in_order(index), channels[checked.rows]

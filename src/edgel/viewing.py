@@ -36,7 +36,10 @@ class Viewing:
 
 
 def choose_method(cloud: Cloud, xyz: np.ndarray, viewpoint: np.ndarray | None = None) -> Viewing:
-    """Choose how to look at a cloud.
+    """Choose how to look at a cloud: as its sensor saw it, where that is known, else at the surface itself.
+
+    A projection of a list of points loses to the surface even where one shows all of them: its pixels are no finer than
+    the spacing (docs/decisions.md).
 
     Parameters
     ----------
@@ -51,8 +54,8 @@ def choose_method(cloud: Cloud, xyz: np.ndarray, viewpoint: np.ndarray | None = 
     >>> import numpy as np
     >>> x, y = np.meshgrid(np.arange(30.0), np.arange(20.0))
     >>> hill = np.c_[x.ravel(), y.ravel(), np.sin(x.ravel() / 5)]
-    >>> choose_method(Cloud(hill), hill).method
-    'orthographic'
+    >>> choose_method(Cloud(hill), hill).method, choose_method(Cloud(hill, shape=(20, 30)), hill).method
+    ('surface', 'organized')
     """
     if cloud.shape is not None and min(cloud.shape) > 1:
         return Viewing("organized", f"the points form a grid of {cloud.shape[0]} x {cloud.shape[1]}")
@@ -70,11 +73,10 @@ def choose_method(cloud: Cloud, xyz: np.ndarray, viewpoint: np.ndarray | None = 
             share = shown(raster, xyz)
             if share >= SHOWN:
                 return Viewing(raster.method, f"{share:.0%} of the points show from the viewpoint", raster)
-    best, most = _best_direction(xyz, viewpoint)
-    if best is not None and most >= SHOWN:
-        x, y, z = best.direction + 0.0
-        return Viewing("orthographic", f"{most:.0%} of the points show along ({x:.2g}, {y:.2g}, {z:.2g})", best)
-    return Viewing("surface", f"no one view shows all: {most:.0%} of the points at most")
+        else:
+            share = 0.0
+        return Viewing("surface", f"only {share:.0%} of the points show from the viewpoint")
+    return Viewing("surface", "the points form no grid and the sensor's place is not known")
 
 
 def look(cloud: Cloud, xyz: np.ndarray, rows: np.ndarray, method: str, viewpoint: np.ndarray | None) -> Viewing:

@@ -15,9 +15,10 @@ from edgel.cli import files, options
 from edgel.cli.errors import ExitCode, Failure, as_option, exit_codes, failing_as
 from edgel.cli.output import count, print_json, print_line, print_table, seconds
 from edgel.cli.progress import Watch
-from edgel.detect import METHODS, PRESETS
+from edgel.detect import PRESETS
 from edgel.edges import ASKABLE, EdgeKind, Edges, as_kinds, kind_names
 from edgel.stages import Stages
+from edgel.viewing import METHODS
 
 HELP = """Find the edge points of a cloud, their kind, and their normals.
 
@@ -158,7 +159,7 @@ def check_options(preset: str, given: dict[str, Any]) -> dict[str, Any]:
         remedy = f"add --preset {others}, or leave it out" if others else "leave it out"
         raise Failure(ExitCode.USAGE, f"{names}: not an option of the {preset} preset; {remedy}")
     if given.get("method", METHODS[0]) not in METHODS:
-        raise Failure(ExitCode.USAGE, f"--method: {given['method']!r} is unknown; choose {' or '.join(METHODS)}")
+        raise Failure(ExitCode.USAGE, f"--method: {given['method']!r} is unknown; choose from {', '.join(METHODS)}")
     if "kinds" in given:
         with failing_as(ExitCode.USAGE, "", ["kinds"]):
             given["kinds"] = as_kinds([name for word in given["kinds"].split(",") if (name := word.strip())])

@@ -80,6 +80,10 @@ def faces(evidence: Evidence, xyz: np.ndarray, viewpoint: np.ndarray | None) -> 
     else:
         inside = ((viewpoint - xyz) * out).sum(axis=1) < 0
     sign = np.where(inside, -1.0, 1.0)
+    # The face that the viewer sees better comes first.
+    sight = np.array([0.0, 0.0, 1.0]) if viewpoint is None else viewpoint - xyz
+    swap = sign[:, None] * ((b - a) * sight).sum(axis=1, keepdims=True) > 0
+    a, b = np.where(swap, b, a), np.where(swap, a, b)
     unknown = np.where(known, 1.0, np.nan)[:, None]
     return Faces(
         position=xyz + foot * unknown,

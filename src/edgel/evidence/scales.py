@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from edgel.normals import smallest_eigenpair
 from edgel.parallel import kernel
 

@@ -81,7 +81,7 @@ def _refine(vectors, count, side, sheets, room):
     """Fit, part, fit again; returns the squares left in all, infinite where a side runs out of neighbours."""
     a, b = room[0], room[1]
     best = np.inf
-    for turn in range(ROUNDS):
+    for _turn in range(ROUNDS):
         n_a, left_a = _plane_of(vectors, count, side, 0, a)
         n_b, left_b = _plane_of(vectors, count, side, 1, b)
         if n_a < 4 or n_b < 4:
