@@ -1,7 +1,7 @@
 """Train the trees of `edgel.evidence` on random scenes of `edgel.synth`, and write their weights into the package.
 
-Run: python benchmarks/train.py [--scenes 700] (an hour on two cores; features are kept in benchmarks/cache/training).
-Needs lightgbm. Nothing of the benchmark and no real data is seen in training: see `training.scene`.
+Run: python benchmarks/train.py [--scenes 700] (15 minutes on two cores; features are kept in benchmarks/cache/training).
+Needs `pip install edgel[train]`. Nothing of the benchmark and no real data is seen in training: see `training.scene`.
 """
 
 from __future__ import annotations

@@ -128,7 +128,9 @@ def test_the_answer_is_well_formed():
     np.testing.assert_allclose(np.linalg.norm(first, axis=1), 1)
     assert ((([0.5, 0.5, 9] - points[found.index]) * first).sum(axis=1) >= 0).all()
     everywhere = edgel.estimate_normals(points, viewpoint=[0.5, 0.5, 9])
-    np.testing.assert_array_equal(first, everywhere.normals[found.index])
+    alone = np.isnan(found.normals[:, 1, 0])  # elsewhere each face has its own fit
+    assert alone.any()
+    np.testing.assert_array_equal(first[alone], everywhere.normals[found.index][alone])
     assert_well_formed(found, points)
 
 

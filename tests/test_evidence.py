@@ -122,7 +122,7 @@ def test_the_package_has_trees_for_its_features():
 
 @pytest.fixture(scope="module")
 def wedge():
-    """A ridge that turns by 60 degrees, sampled all round."""
+    """A ridge that turns by 60 degrees, its feet by 30, sampled all round."""
     return synth.sample(synth.wedge_fan(angles=(120,), flank=20.0, width=40.0), pattern="blue_noise", spacing=0.8)
 
 
