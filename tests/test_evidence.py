@@ -152,13 +152,12 @@ def between(a, b):
     return np.degrees(np.arccos(np.clip(np.abs((a * b).sum(axis=1)), 0, 1)))
 
 
-def test_creases_are_found_and_little_else(wedge, found):
-    true = wedge.edges.positions[wedge.edges.dihedral > np.radians(25)]
+@pytest.mark.parametrize(("turn", "recall"), [(45, 0.97), (25, 0.8)])
+def test_creases_are_found_and_little_else(wedge, found, turn, recall):
+    true = wedge.edges.positions[wedge.edges.dihedral > np.radians(turn)]
     places = wedge.cloud.xyz[found.index]
-    assert (
-        np.mean(metrics.nearest(true, places).distances[:, 0] <= wedge.spacing) >= 0.94
-    )  # its feet turn by 30 degrees only
-    away = metrics.nearest(places, true).distances[:, 0] > 2.5 * wedge.spacing
+    assert np.mean(metrics.nearest(true, places).distances[:, 0] <= wedge.spacing) >= recall
+    away = metrics.nearest(places, wedge.edges.positions).distances[:, 0] > 2.5 * wedge.spacing
     assert away.sum() <= len(wedge.cloud) / 1000
 
 

@@ -35,7 +35,7 @@ def off_block(places):
     tree = build_ray_tree(BLOCK)
     nearest = np.full(len(places), np.inf)
     for way in np.concatenate([np.eye(3), -np.eye(3)]):
-        found = cast(tree, places - 0.01 * way + 3e-7, np.broadcast_to(way, places.shape)).distance
+        found = cast(tree, places - 0.01 * way, np.broadcast_to(way, places.shape)).distance
         nearest = np.minimum(nearest, np.abs(found - 0.01))
     return nearest
 
@@ -108,7 +108,7 @@ def test_samples_have_the_spacing_lie_on_the_surface_and_cover_it(pattern, solid
     assert error.std(axis=0) == pytest.approx(0.2 * solid.spacing, rel=0.05)
     x, y, z = scene.noise_free.T
     if solid.name == "stepped_block":
-        off = off_block(scene.noise_free)
+        off = off_block(scene.noise_free[scene.point_kind == 0])  # on an edge rays along the axes graze
     elif solid.name == "torus":
         off = np.hypot(np.hypot(x, y) - 30, z) - 12
     else:

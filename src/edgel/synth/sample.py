@@ -136,18 +136,21 @@ def _vertices(solid: Solid, spacing: float, rng: np.random.Generator) -> tuple[n
 def _on_surface(solid: Solid, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Triangles (N,) that hold places (N, 3) on the surface, and the weights (N, 3) of their corners there."""
     triangle, weights = np.zeros(len(places), np.int64), np.zeros((len(places), 3))
+    slack = 1e-6 * solid.size
+    low, high = solid.corners.min(axis=1) - slack, solid.corners.max(axis=1) + slack
     for i, place in enumerate(places):
-        a, b, c = np.moveaxis(solid.corners, 1, 0)
+        near = np.flatnonzero(((low <= place) & (place <= high)).all(axis=1))
+        a, b, c = np.moveaxis(solid.corners[near], 1, 0)
         u, v, w = b - a, c - a, place - a
         uu, uv, vv = (u * u).sum(1), (u * v).sum(1), (v * v).sum(1)
         wu, wv = (w * u).sum(1), (w * v).sum(1)
-        det = np.maximum(uu * vv - uv * uv, 1e-30)
-        s, t = (vv * wu - uv * wv) / det, (uu * wv - uv * wu) / det
-        bary = np.clip(np.stack([1 - s - t, s, t], axis=1), 0, None)
-        bary /= bary.sum(axis=1, keepdims=True)
-        off = ((bary[:, :, None] * solid.corners).sum(axis=1) - place) ** 2
+        area = np.maximum(uu * vv - uv * uv, 1e-30)
+        s, t = (vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area
+        inside = np.clip(np.stack([1 - s - t, s, t], axis=1), 0, None)
+        inside /= inside.sum(axis=1, keepdims=True)
+        off = ((inside[:, :, None] * solid.corners[near]).sum(axis=1) - place) ** 2
         best = int(off.sum(axis=1).argmin())
-        triangle[i], weights[i] = best, bary[best]
+        triangle[i], weights[i] = near[best], inside[best]
     return triangle, weights
 
 
