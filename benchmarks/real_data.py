@@ -23,11 +23,11 @@ REMARKS = {
     "airborne": "The default draws the border of the flat tile and the roof lines; tree crowns are speckled with false "
     "edges. The paper marks wide bands: at this density its pixels are metres wide. `interesting.las`, the COPC and the "
     "UTM file are a thousand points spread over a town, several spacings to the next house: nothing to find.",
-    "kinect_objects": "Depth quantised to steps of some millimetres: the default takes the steps on the table for creases and "
-    "is speckled all over; the outlines of the boxes are there, their inner creases only in part. The paper "
+    "kinect_objects": "Depth quantised to steps of some millimetres: the default shows the outlines of the boxes and their "
+    "shadows, and short false dashes all over the table where the steps are. The paper "
     "marks the outlines as wide bands and nothing inside.",
-    "kinect_organized": "As above. `organized_edge_1` is a rendered, noise-free frame: there the default finds every "
-    "outline, but breaks the long fold between wall and table into dashes. The paper finds the outlines only.",
+    "kinect_organized": "As above. `organized_edge_1` is a rendered, noise-free frame: there the default finds the "
+    "outlines and the folds. The paper finds the outlines only.",
     "lidar_sweeps": "Points lie on rings far apart: for the default nearly every ring is a boundary, for the paper every "
     "pixel beside a ring is an edge. Both are useless here.",
     "roofs": "About a thousand points a roof. The default finds the eaves and parts of the ridges with much noise. "

@@ -192,6 +192,11 @@ def test_twice_as_dense_keeps_the_edges(wedge, found):
     assert apart.chamfer <= wedge.spacing
 
 
+def test_many_points_at_one_place_are_borne(wedge):
+    repeated = np.concatenate([wedge.cloud.xyz, np.repeat(wedge.cloud.xyz[:3], 200, axis=0)])
+    assert np.isfinite(edgel.detect(repeated).position).all()
+
+
 def test_threads_change_nothing(wedge, found, monkeypatch):
     monkeypatch.setenv("EDGEL_NUM_THREADS", "1")
     alone = edgel.detect(wedge.cloud)

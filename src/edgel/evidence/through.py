@@ -58,7 +58,7 @@ def _best_plane(vectors, count, spacing, tolerance, other, cos_min, plane):
             y = vectors[i, 2] * vectors[j, 0] - vectors[i, 0] * vectors[j, 2]
             z = vectors[i, 0] * vectors[j, 1] - vectors[i, 1] * vectors[j, 0]
             area = math.sqrt(x * x + y * y + z * z)
-            if area < _FLAT * spacing * spacing:
+            if not area > _FLAT * spacing * spacing:  # not even where all are one point
                 continue
             x, y, z = x / area, y / area, z / area
             if not first and abs(x * other[0] + y * other[1] + z * other[2]) > cos_min:
