@@ -18,7 +18,7 @@ LAYERS = [
     {"cloud"},
     {"kdtree"},
     {"neighbors"},
-    {"normals", "canny"},
+    {"normals", "canny", "chains"},
     {"project", "evidence", "edges", "raster", "color"},
     {"facets", "viewing"},
     {"outline"},

@@ -78,6 +78,14 @@ def detect(
     report: Annotated[
         str | None, typer.Option(metavar="DIR", help="Write a report with figures into this folder.")
     ] = None,
+    min_strength: Annotated[
+        float | None,
+        options.option(
+            edgel.detect,
+            "min_strength",
+            "Least strength of an edge point, 0 to 1: at 0.5 it is as likely an edge as not; lower finds fainter ones.",
+        ),
+    ] = None,
     num_neighbors: Annotated[
         int | None, options.option(edgel.detect, "num_neighbors", "Neighbours of each plane fit, the point among them.")
     ] = None,
@@ -102,6 +110,7 @@ def detect(
     given = {
         "kinds": kinds,
         "method": method,
+        "min_strength": min_strength,
         "num_neighbors": num_neighbors,
         "viewpoint": viewpoint,
         "width": width,
