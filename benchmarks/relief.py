@@ -13,7 +13,7 @@ from edgel.synth.sample import _keep_apart
 SMOOTH = 0.25  # share of the reliefs that have no edge at all
 LEAST_TURN = np.radians(18.0)
 SALIENT = 2.5  # times the bend of the ground: what bends less is not asked for
-BAND, OPEN = 0.4, 0.8  # of half the rounding's width: the edge's band; and up to where it is left open what is edge
+BAND, OPEN = 0.3, 0.7  # of half the rounding's width: the edge's band; and up to where it is left open what is edge
 DISC = 0.752  # see edgel.synth.sample
 
 
@@ -91,7 +91,7 @@ class _Curve:
             x = (away - knot) / self.round
             height += change * self.round * np.where(x < -1, 0, np.where(x > 1, x, (np.clip(x, -1, 1) + 1) ** 2 / 4))
             along = np.abs(away - knot) * np.sqrt(1 + ((before + after) / 2) ** 2)
-            band = max(0.5, min(BAND * self.round, 1.6))
+            band = max(0.5, min(BAND * self.round, 1.3))
             edge |= (along <= band) & sharp
             between |= along <= max(band if sharp else 0.8, OPEN * self.round)
         return height, edge, between, (away > self.knots[0] - 4) & (away < self.knots[-1] + 4)

@@ -1,9 +1,10 @@
 """Train the trees of `edgel.evidence` on random scenes of `edgel.synth`, and write their weights into the package.
 
-Run: python benchmarks/train.py [--scenes 1400] (40 minutes on two cores; evidence is kept in benchmarks/cache/training).
+Run: python benchmarks/train.py [--scenes 2000] (20 minutes on two cores; evidence is kept in benchmarks/cache/training).
 Needs `pip install edgel[train]`. Nothing of the benchmark and no real data is seen in training: see `training.example`.
 
-The first trees judge each point by its own evidence. What the second ones hear of the neighbours' chances has to be what
+Glances, at leaves of the index and at each point's nearest, say where to look closer; the rest learns from what they let
+through. The first trees judge each point by its own evidence. What the second ones hear of the neighbours' chances has to be what
 the first say of scenes they were not trained on: each half of the scenes is judged by trees trained on the other half.
 """
 
@@ -20,22 +21,24 @@ import numpy as np
 import training
 
 from edgel import evidence, metrics
-from edgel.evidence import Evidence
-from edgel.evidence.forest import Forest, evaluate
+from edgel.evidence import Evidence, coarse
+from edgel.evidence.forest import Forest, evaluate, read_forests
 from edgel.kdtree import build_index
 
 CACHE = Path(__file__).parent / "cache" / "training"
 OUT = Path(evidence.__file__).parent / evidence.WEIGHTS
+GLANCES = CACHE / "glances.npz"
+SKIMMED = 500  # scenes that the trees of the first glances learn from
 KINDS = ("crease", "outline")
 FIRST = {"crease": (160, 31), "outline": (100, 31)}  # trees and leaves of each forest
 SECOND = {"crease": (300, 63), "outline": (150, 63)}
 SCREEN = (60, 15)
+COARSE = (100, 15)
 LOOSE = 0.5  # of the screen's threshold: points it would nearly look at are examined in training too
 UNLIKELY = 0.02  # share of all the others
 NEAR, SHARE_NEAR, SHARE_FAR = 3.0, 0.4, 0.15  # of points that are no edge, within so many spacings of one or not
 OPTIONS = {
     "objective": "binary",
-    "learning_rate": 0.08,
     "min_data_in_leaf": 40,
     "feature_fraction": 0.6,
     "bagging_fraction": 0.7,
@@ -49,11 +52,21 @@ OPTIONS = {
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scenes", type=int, default=1400)
+    parser.add_argument("--scenes", type=int, default=2000)
     parser.add_argument("--out", type=Path, default=OUT)
     options = parser.parse_args()
     CACHE.mkdir(parents=True, exist_ok=True)
+    skimmed = range(min(options.scenes, SKIMMED))
     with get_context("spawn").Pool(2, initializer=one_thread) as pool:
+        points, wanted, weights, leaves, edge = (
+            np.concatenate(part) for part in zip(*pool.imap(skim, skimmed), strict=True)
+        )
+        print(f"{len(points):,} points and {len(leaves):,} leaves skimmed", flush=True)
+        glances = {
+            "screen": grow(points, wanted, weights, SCREEN, 0.1),
+            "coarse": grow(leaves, edge, np.ones(len(edge)), COARSE, 0.25),
+        }
+        save(GLANCES, glances)
         for done, path in enumerate(pool.imap(prepare, range(options.scenes)), start=1):
             print(f"\r{done} of {options.scenes} scenes: {path.name}", end="", flush=True)
     features, labels, weights = (np.concatenate(part) for part in zip(*map(load, range(options.scenes)), strict=True))
@@ -66,7 +79,6 @@ def main() -> None:
     apart = [(f"first {kind}", FIRST[kind], other) for kind in KINDS for other in (0, 1)]
     with get_context("spawn").Pool(2, initializer=one_thread) as pool:
         forests = dict(zip([*whole, *apart], pool.imap(train, [*whole, *apart]), strict=True))
-        screen = pool.apply(train, [("screen", SCREEN, None)])
         trees = [{kind: forests[f"first {kind}", FIRST[kind], other] for kind in KINDS} for other in (0, 1)]
         looked = list(pool.imap(look_around, [(seed, trees[seed % 2]) for seed in range(options.scenes)], chunksize=4))
         print("the first trees", flush=True)
@@ -74,15 +86,30 @@ def main() -> None:
             np.save(CACHE / f"{name}.npy", np.concatenate(part))
         del looked
         second = pool.map(train, [(kind, SECOND[kind], None) for kind in KINDS], chunksize=1)
-    named = {"screen": screen, **{name: forests[name, size, None] for name, size, _ in whole}}
-    named |= dict(zip(KINDS, second, strict=True))
-    fields = Forest.__dataclass_fields__
-    np.savez_compressed(options.out, **{f"{n}.{key}": getattr(f, key) for n, f in named.items() for key in fields})
+    first = {name: forests[name, size, None] for name, size, _ in whole}
+    save(options.out, glances | first | dict(zip(KINDS, second, strict=True)))
     print(f"{options.out}: {options.out.stat().st_size / 1e3:.0f} kB")
 
 
 def one_thread() -> None:
     os.environ["EDGEL_NUM_THREADS"] = "1"
+
+
+def skim(seed: int) -> tuple[np.ndarray, ...]:
+    """Cheap evidence of some points of a scene, which are edge points, and how much each counts; the same of all leaves."""
+    example = training.example(seed)
+    index = build_index(np.ascontiguousarray(example.xyz))
+    edge, counts = example.labels.any(axis=1)[index.order], example.counts[index.order]
+    cloud, _ = evidence.census(index)
+    share = np.where(edge, 1.0, SHARE_FAR)
+    places = np.flatnonzero(counts & (np.random.default_rng(seed).random(len(edge)) < share))
+    leaves, _ = coarse.look(index)
+    starts = np.arange(len(leaves)) * len(index) // len(leaves)
+    points, leaves = (
+        np.concatenate([part, np.broadcast_to(cloud, (len(part), len(cloud)))], axis=1)
+        for part in (evidence.describe(index, places), leaves)
+    )
+    return points, edge[places], 1 / share[places], leaves, np.logical_or.reduceat(edge, starts)
 
 
 def prepare(seed: int) -> Path:
@@ -93,7 +120,7 @@ def prepare(seed: int) -> Path:
     example = training.example(seed)
     xyz = np.ascontiguousarray(example.xyz)
     index = build_index(xyz)
-    surveyed = evidence.survey(index)
+    surveyed = evidence.survey(index, read_forests(str(GLANCES)))
     edge = example.labels.any(axis=1)[index.order]
     likely = surveyed.likely > LOOSE * evidence.SCREEN
     chosen = likely | edge | (np.random.default_rng(seed).random(len(xyz)) < UNLIKELY)
@@ -156,14 +183,24 @@ def look_around(job: tuple[int, dict[str, Forest]]) -> tuple[np.ndarray, np.ndar
 
 
 def train(job: tuple[str, tuple[int, int], int | None]) -> Forest:
-    """Train a forest, on all scenes or on those that are not of one half."""
-    name, (trees, leaves), other = job
+    """Train a forest of the kept points, of all scenes or of those that are not of one half."""
+    name, size, other = job
     features, labels, weights = (np.load(CACHE / f"{n}.npy", mmap_mode="r") for n in ("features", "labels", "weights"))
     rows = slice(None) if other is None else np.flatnonzero(np.load(CACHE / "half.npy") != other)
-    columns = slice(evidence.NUM_CHEAP if name == "screen" else None)
-    wanted = labels.any(axis=1) if name == "screen" else labels[:, KINDS.index(name.split()[-1])]
-    data = lightgbm.Dataset(features[rows, columns], wanted[rows], weight=weights[rows])
-    return flatten(lightgbm.train(OPTIONS | {"num_leaves": leaves}, data, trees))
+    return grow(features[rows], labels[rows, KINDS.index(name.split()[-1])], weights[rows], size)
+
+
+def grow(
+    features: np.ndarray, wanted: np.ndarray, weights: np.ndarray, size: tuple[int, int], rate: float = 0.08
+) -> Forest:
+    trees, leaves = size
+    data = lightgbm.Dataset(features, wanted, weight=weights)
+    return flatten(lightgbm.train(OPTIONS | {"num_leaves": leaves, "learning_rate": rate}, data, trees))
+
+
+def save(path: Path, forests: dict[str, Forest]) -> None:
+    fields = Forest.__dataclass_fields__
+    np.savez_compressed(path, **{f"{name}.{key}": getattr(f, key) for name, f in forests.items() for key in fields})
 
 
 def flatten(model: lightgbm.Booster) -> Forest:

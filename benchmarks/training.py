@@ -259,7 +259,9 @@ def _rounded_box(rng: np.random.Generator) -> Solid:
     for axis in range(3):
         for sign in (-1, 1):
             others = [(axis + 1) % 3, (axis + 2) % 3][::sign]
-            u, v = np.meshgrid(*(np.maximum(ticks[o], 0) if cut and o == 2 else ticks[o] for o in others), indexing="ij")
+            u, v = np.meshgrid(
+                *(np.maximum(ticks[o], 0) if cut and o == 2 else ticks[o] for o in others), indexing="ij"
+            )
             if cut and axis == 2 and sign < 0:
                 continue
             grid = np.empty((*u.shape, 3))
@@ -271,7 +273,9 @@ def _rounded_box(rng: np.random.Generator) -> Solid:
             normals = out / np.linalg.norm(out, axis=-1, keepdims=True)
             patches.append((inner + radius * normals, normals))
     if cut:
-        patches += [_under(points) for points, _ in patches if np.ptp(points[..., 2]) > 0 and (points[..., 2] == 0).any()]
+        patches += [
+            _under(points) for points, _ in patches if np.ptp(points[..., 2]) > 0 and (points[..., 2] == 0).any()
+        ]
     return _patches("rounded_box", patches, spacing=0.8)
 
 
@@ -294,7 +298,9 @@ def _blended(rng: np.random.Generator) -> Solid:
     top[:, 1] += rng.uniform(3, 20) - top[:, 1].min()
     width = rng.uniform(10, 50)
     corners = [(x[0], 0.0), (x[-1], 0.0), *map(tuple, top[::-1].tolist())]
-    radii = np.concatenate([[0, 0], np.where(rng.random(count) < rng.choice([0.5, 0.9, 1.0]), _spread(rng, 0.8, 7, count), 0)])
+    radii = np.concatenate(
+        [[0, 0], np.where(rng.random(count) < rng.choice([0.5, 0.9, 1.0]), _spread(rng, 0.8, 7, count), 0)]
+    )
     pieces = _rounded(np.asarray(corners), radii, closed=True, spacing=0.8)
     steps = np.unique(np.concatenate([points[:, 0] for points, _ in pieces]))  # the bottom shares the walls' corners
     pieces[0] = (np.column_stack([steps, np.zeros_like(steps)]), np.tile([0.0, -1.0], (len(steps), 1)))

@@ -1,5 +1,6 @@
 """Evidence: each kernel against its slow oracle, the trees against a plain walk, and what `detect` makes of it."""
 
+import itertools
 import math
 
 import naive
@@ -9,7 +10,7 @@ import pytest
 import edgel
 from edgel import evidence, metrics, synth
 from edgel.edges import EdgeKind
-from edgel.evidence import FITS, context, scales, sectors, sheets, through
+from edgel.evidence import FITS, coarse, context, scales, sectors, sheets, through
 from edgel.evidence.forest import Forest, evaluate
 from edgel.evidence.scales import SCALES, fit_scales
 from edgel.evidence.sectors import sector_gaps
@@ -140,6 +141,31 @@ def test_context_hears_the_neighbours_along_and_beside_the_edge():
     assert sure[1] > 0.5
 
 
+def test_the_look_at_leaves_matches_numpy():
+    xyz = neighbourhood(np.random.default_rng(1), count=500)
+    index = build_index(xyz)
+    features, planes = coarse.look(index)
+    leaves = len(features)
+    limits = np.arange(leaves + 1) * len(xyz) // leaves
+    points = [index.xyz[:, a:b].T for a, b in itertools.pairwise(limits)]
+    middles = np.array([p.mean(axis=0) for p in points])
+    for leaf in range(leaves):
+        normal, variation, _ = naive.covariance_plane(points[leaf])
+        assert abs(planes[leaf, :3] @ normal) == pytest.approx(1, abs=1e-7)
+        assert planes[leaf, 3] == pytest.approx(math.exp(-variation / coarse.PLANAR), rel=1e-4)
+        nearest = np.argsort(((middles - middles[leaf]) ** 2).sum(axis=1))
+        size = math.sqrt(points[leaf].var(axis=0).sum())
+        for g, count in enumerate(coarse.GROUPS):
+            group = np.concatenate([points[i] for i in nearest[:count]])
+            normal, variation, _ = naive.covariance_plane(group)
+            aside = group.mean(axis=0) - middles[leaf]
+            off = aside @ normal
+            expected = [math.log(variation + 1e-6), abs(off) / size, math.sqrt(max(aside @ aside - off**2, 0)) / size]
+            assert features[leaf, 4 * g : 4 * g + 3] == pytest.approx(expected, abs=2e-3)
+            assert features[leaf, 4 * g + 3] == pytest.approx(math.sqrt(group.var(axis=0).sum()) / size, rel=1e-4)
+        assert features[leaf, -1] == len(points[leaf])
+
+
 def test_trees_match_a_plain_walk():
     rng = np.random.default_rng(0)
     forest = Forest(
@@ -155,6 +181,7 @@ def test_trees_match_a_plain_walk():
 
 def test_the_package_has_trees_for_its_features():
     for name, count in (
+        ("coarse", coarse.NUM_FEATURES + evidence.NUM_CLOUD),
         ("screen", evidence.NUM_CHEAP),
         ("first crease", evidence.NUM_COSTLY),
         ("first outline", evidence.NUM_COSTLY),

@@ -181,3 +181,5 @@ def test_no_rings_where_there_are_none():
     assert count_rings(rng.standard_normal((20000, 3))) == 0
     assert count_rings(grid(200, 200).reshape(-1, 3) + (1.0, 1.0, 5.0)) == 0
     assert count_rings(sweep()[:500]) == 0  # too few to tell
+    flat = np.column_stack([rng.uniform(-50, 50, (20000, 2)), 0.1 * rng.standard_normal(20000)])
+    assert count_rings(np.concatenate([flat, rng.uniform(-60, 60, (200, 3))])) == 0  # outliers all round are no rings

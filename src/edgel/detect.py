@@ -21,7 +21,7 @@ from edgel.viewing import METHODS, look
 
 PRESETS = ("default", "paper")
 DEFAULT_KINDS = EdgeKind.BOUNDARY | EdgeKind.OCCLUDING | EdgeKind.OCCLUDED | EdgeKind.CREASE
-EVEN = (0.3, 0.5)  # probability of an edge whose strength is a half: least, on the vaguest cloud, and most
+EVEN = (0.4, 0.5)  # probability of an edge whose strength is a half: least, on the vaguest cloud, and most
 COLOR = 0.2  # contrast of a color edge whose strength is a half
 
 
@@ -165,8 +165,8 @@ def detect(
 def strength(probability: np.ndarray) -> np.ndarray:
     """Turn the probabilities of one kind into strengths, so that one half is the best place to draw the line.
 
-    That is where the expected F1 is greatest: half of it (Lipton et al. 2014, doi:10.1007/978-3-662-44851-9_15), near one
-    half where edges are plain, lower where noise leaves none of them sure. Odds keep their ratio.
+    The expected F1 is greatest at half of it (Lipton et al. 2014, doi:10.1007/978-3-662-44851-9_15): near one half
+    where edges are plain, lower where noise leaves none of them sure. Odds keep their ratio.
     """
     falling = np.sort(probability)[::-1]
     expected = np.cumsum(falling) / (np.arange(1, len(falling) + 1) + falling.sum())

@@ -57,9 +57,7 @@ def without_lonely(depth: np.ndarray, spacing: np.ndarray, noise: np.ndarray) ->
     return kept
 
 
-def local_planes(
-    depth: np.ndarray, noise: np.ndarray, wanted: np.ndarray, perspective: bool, reach: int
-) -> np.ndarray:
+def local_planes(depth: np.ndarray, noise: np.ndarray, wanted: np.ndarray, perspective: bool, reach: int) -> np.ndarray:
     """Fit a plane to each wanted pixel's own side of whatever edge is near.
 
     Returns

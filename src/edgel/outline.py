@@ -133,7 +133,7 @@ def depth_steps(
 
 
 def beside_gap(depth: np.ndarray, least: np.ndarray) -> np.ndarray:
-    """Pixels with a hole above, below, left or right, or a depth that differs by at least `least` (H, W); (H, W) bool."""
+    """Pixels beside a hole, or beside a depth that differs by `least` (H, W) or more; (H, W) bool."""
     wanted = np.zeros(depth.shape, bool)
     for axis in (0, 1):
         first, second, own = (np.moveaxis(image, axis, 0) for image in (depth, least, wanted))

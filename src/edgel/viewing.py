@@ -17,7 +17,9 @@ DEPTH = 3.0  # spacings behind the nearest point of its pixel within which a poi
 _CAMERA = 0.5  # least cosine to the mean ray in the view of a camera
 _RINGS = (8, 256)  # how many lasers a spinning sensor has
 _RING_SHOTS = 100  # least mean number of shots of each
-_GAP, _SHARP = 5e-4, 0.1  # of the range of elevations: least gap between rings, and most that all of them are thick
+_ON_RINGS = 0.95  # least share of the shots that lie on them
+_GAP = 5e-4  # of the range of elevations: least gap between rings
+_SHARP = 0.3  # of the gap between two rings: most that a ring is thick
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,13 +105,14 @@ def count_rings(xyz: np.ndarray) -> int:
     elevation = np.sort(np.arctan2(xyz[away, 2], level[away]))
     if len(elevation) < _RINGS[0] * _RING_SHOTS:
         return 0
-    extent = elevation[-1] - elevation[0]
-    gaps = np.diff(elevation)
-    wide = gaps > _GAP * extent
-    rings = int(wide.sum()) + 1
-    thick = extent - gaps[wide].sum()
-    fits = _RINGS[0] <= rings <= _RINGS[1] and len(elevation) >= rings * _RING_SHOTS and thick <= _SHARP * extent
-    return rings if fits else 0
+    parted = np.flatnonzero(np.diff(elevation) > _GAP * (elevation[-1] - elevation[0]))
+    first, last = np.append(0, parted + 1), np.append(parted, len(elevation) - 1)
+    full = last - first + 1 >= _RING_SHOTS
+    first, last = first[full], last[full]
+    if not _RINGS[0] <= len(first) <= _RINGS[1] or (last - first + 1).sum() < _ON_RINGS * len(elevation):
+        return 0
+    thick, apart = elevation[last] - elevation[first], elevation[first[1:]] - elevation[last[:-1]]
+    return len(first) if np.median(thick) < _SHARP * np.median(apart) else 0
 
 
 def _from_viewpoint(project: Callable[..., Raster], xyz: np.ndarray, viewpoint: np.ndarray) -> Raster:

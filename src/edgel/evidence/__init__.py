@@ -7,13 +7,14 @@ makes an edge likely, the neighbours' chances are heard too.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
 import numpy as np
 
-from edgel.evidence import context, gather, scales, sectors, sheets, through
+from edgel.evidence import coarse, context, gather, scales, sectors, sheets, through
 from edgel.evidence.forest import Forest, evaluate, read_forests
 from edgel.evidence.scales import SCALES
 from edgel.kdtree import NeighborIndex, build_index
@@ -28,6 +29,7 @@ NUM_COSTLY = (
 )
 NUM_ALL = NUM_COSTLY + 2 * context.NUM_FEATURES
 WEIGHTS = "weights.npz"
+COARSE = 0.005  # least probability of an edge in a leaf, by a glance at it, for looking at its points at all
 SCREEN = 0.02  # least probability of an edge, from the cheap evidence, for a closer look
 SECOND = 0.02  # and from the costly evidence, for a second one
 MAX_AWAY = 1.5  # spacings: a line farther from the point is not its edge
@@ -39,16 +41,17 @@ _FLOOR = 0.02  # spacings: residuals below it do not make one fit better than an
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """The cheap evidence of every point, in the order of the index.
+    """The cheap evidence of the points, in the order of the index.
 
     Attributes
     ----------
     normals : (N, S, 4) float32
-        Normal and planarity of the plane fitted at each of `SCALES`.
+        Normal and planarity of the plane fitted at each of `SCALES`; where a leaf of the index was found smooth, that
+        of the leaf.
     likely : (N,) float32
         Chance of an edge, by the cheap evidence.
     cloud : (NUM_CLOUD,) float32
-        What is typical of the cloud: see `_census`.
+        What is typical of the cloud: see `census`.
     has_surface : bool
         Whether any neighbourhood spans a plane.
     """
@@ -118,41 +121,60 @@ class Verdict:
     evidence: Evidence
 
 
-def survey(index: NeighborIndex) -> Survey:
-    """Gather the cheap evidence of every point."""
-    k, steps = min(SCALES[-1], len(index)), np.array(SCALES)
-    every = index.xyz[:, :: max(len(index) // _CENSUS, 1)].T
-    typical = np.zeros((len(every), scales.NUM_FEATURES), np.float32)
-    visit_neighbors(gather.describe, build_index(np.ascontiguousarray(every)), index, k, steps, typical)
-    cloud = _census(typical)
-    normals = np.zeros((len(index), len(SCALES), 4), np.float32)
+def survey(index: NeighborIndex, trees: Mapping[str, Forest] | None = None) -> Survey:
+    """Gather the cheap evidence of every point that a glance at the leaves of the index does not rule out.
+
+    Takes the forests "coarse" and "screen", by default those of the package.
+    """
+    trees = forests() if trees is None else trees
+    cloud, has_surface = census(index)
+    leaves, planes = coarse.look(index)
+    known = np.concatenate([leaves, np.broadcast_to(cloud, (len(leaves), NUM_CLOUD))], axis=1)
+    size = np.diff(np.arange(len(leaves) + 1) * len(index) // len(leaves))
+    rough = np.repeat(evaluate(trees["coarse"], known) >= COARSE, size)
+    normals = np.repeat(planes[:, None].astype(np.float32), len(SCALES), axis=1).repeat(size, axis=0)
     likely = np.zeros(len(index), np.float32)
-    forest = forests()["screen"]
-    visit_neighbors(
-        gather.survey,
-        index,
-        index,
-        k,
-        steps,
-        cloud,
-        forest.roots,
-        forest.feature,
-        forest.threshold,
-        forest.right,
-        normals,
-        likely,
-    )
-    line_like = typical[:, 6 * (len(SCALES) - 1) + 1]
-    return Survey(normals, likely, cloud, bool((line_like > 1e-10).any()))
+    places = np.flatnonzero(rough)
+    forest = trees["screen"]
+    if len(places):
+        visit_neighbors(
+            gather.survey,
+            build_index(np.ascontiguousarray(index.xyz[:, places].T)),
+            index,
+            min(SCALES[-1], len(index)),
+            places,
+            np.array(SCALES),
+            cloud,
+            forest.roots,
+            forest.feature,
+            forest.threshold,
+            forest.right,
+            normals,
+            likely,
+        )
+    return Survey(normals, likely, cloud, has_surface)
 
 
-def _census(features: np.ndarray) -> np.ndarray:
-    """Quantiles of the cheap evidence of some points: how bent, how noisy, how evenly sampled the cloud is."""
+def describe(index: NeighborIndex, places: np.ndarray) -> np.ndarray:
+    """Return the cheap evidence (M, NUM_CHEAP - NUM_CLOUD) float32 of the points at some places (M,) of the index."""
+    features = np.zeros((len(places), scales.NUM_FEATURES), np.float32)
+    queries = build_index(np.ascontiguousarray(index.xyz[:, places].T))
+    visit_neighbors(gather.describe, queries, index, min(SCALES[-1], len(index)), np.array(SCALES), features)
+    return features
+
+
+def census(index: NeighborIndex) -> tuple[np.ndarray, bool]:
+    """Say how bent, how noisy and how evenly sampled a cloud is, (NUM_CLOUD,) float32; and whether it has a surface.
+
+    From quantiles of the cheap evidence of points strewn over it; it has a surface if any neighbourhood spans a plane.
+    """
+    features = describe(index, np.arange(0, len(index), max(len(index) // _CENSUS, 1)))
     bent, small, nearest, row_like = (features[:, i] for i in (12, 0, scales.NUM_FEATURES - 2, 1))
-    return np.concatenate(
+    cloud = np.concatenate(
         [np.quantile(bent, [0.1, 0.5, 0.9]), np.quantile(small, [0.1, 0.5]), np.quantile(nearest, [0.1, 0.5])]
         + [np.quantile(row_like, [0.5])]
-    ).astype(np.float32)
+    )
+    return cloud.astype(np.float32), bool((features[:, 6 * (len(SCALES) - 1) + 1] > 1e-10).any())
 
 
 def examine(index: NeighborIndex, surveyed: Survey, xyz: np.ndarray) -> Evidence:

@@ -29,24 +29,39 @@ def describe(first, places, squared, queries, query_order, xyz, scales, features
     for q in range(places.shape[0]):
         relative(places[q], queries, first + q, xyz, vectors)
         fit_scales(vectors, squared[q], scales, fitted, found)
-        features[first + q] = found
+        features[query_order[first + q]] = found
 
 
 @kernel
 def survey(
-    first, places, squared, queries, query_order, xyz, scales, cloud, roots, feature, threshold, right, normals, likely
+    first,
+    places,
+    squared,
+    queries,
+    query_order,
+    xyz,
+    asked,
+    scales,
+    cloud,
+    roots,
+    feature,
+    threshold,
+    right,
+    normals,
+    likely,
 ):
-    """Write the plane at each scale and, by the trees given, the chance of an edge, of every point."""
+    """Write the plane at each scale and, by the trees given, the chance of an edge, of the points at places `asked`."""
     cheap = 6 * len(scales) + 2
     vectors, fitted, found = np.empty((3, places.shape[1])), np.zeros((len(scales), 4)), np.zeros(cheap)
-    asked = np.zeros(cheap + len(cloud), np.float32)
-    asked[cheap:] = cloud
+    features = np.zeros(cheap + len(cloud), np.float32)
+    features[cheap:] = cloud
     for q in range(places.shape[0]):
+        place = asked[query_order[first + q]]
         relative(places[q], queries, first + q, xyz, vectors)
         fit_scales(vectors, squared[q], scales, fitted, found)
-        normals[first + q] = fitted
-        asked[:cheap] = found
-        likely[first + q] = probability(asked, roots, feature, threshold, right)
+        normals[place] = fitted
+        features[:cheap] = found
+        likely[place] = probability(features, roots, feature, threshold, right)
 
 
 @kernel
