@@ -127,7 +127,6 @@ def prepare(seed: int) -> Path:
     places = np.flatnonzero(chosen)
     rows = index.order[places]
     found = evidence.examine(index, surveyed, np.ascontiguousarray(xyz[rows]))
-    best, _ = found.best_fit()
     near = np.zeros(len(xyz), bool)
     if edge.any():
         near = metrics.nearest(xyz, xyz[index.order[edge]]).distances[:, 0] < NEAR * example.spacing
@@ -137,8 +136,8 @@ def prepare(seed: int) -> Path:
         xyz=xyz,
         places=places,
         features=found.features,
-        best=best,
-        sheets=found.sheets[np.arange(len(best)), best],
+        fit=found.fit,
+        placed=found.placed,
         labels=example.labels[rows],
         counts=example.counts[rows],
         near=near[rows],
@@ -169,10 +168,7 @@ def look_around(job: tuple[int, dict[str, Forest]]) -> tuple[np.ndarray, np.ndar
         stored = dict(stored)
     chances = {kind: evaluate(trees[kind], stored["features"]) for kind in KINDS}
     good = (np.stack(list(chances.values())) > evidence.SECOND).any(axis=0) & (stored["share"] == 1)
-    best = stored["best"]
-    sheets = np.zeros((len(best), len(evidence.FITS), stored["sheets"].shape[1]), np.float32)
-    sheets[np.arange(len(best)), best] = stored["sheets"]
-    found = Evidence(stored["features"], sheets).take(good)
+    found = Evidence(*(stored[name] for name in ("features", "fit", "placed"))).take(good)
     index = build_index(stored["xyz"])
     features = evidence.look_around(
         index, stored["places"][good], found, chances["crease"][good], chances["outline"][good]

@@ -7,7 +7,7 @@ makes an edge likely, the neighbours' chances are heard too.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -76,30 +76,29 @@ class Evidence:
     Attributes
     ----------
     features : (M, NUM_COSTLY) float32
-    sheets : (M, F, 24) float32
-        The two planes found at each of `FITS`, relative to the point: see `edgel.evidence.sheets.fit_sheets`.
+    fit : (M, 24) float32
+        The two planes, relative to the point, of the fit that places its edge best: see
+        `edgel.evidence.sheets.fit_sheets`.
+    placed : (M,) bool
+        Whether any fit places an edge near the point.
     """
 
     features: np.ndarray
-    sheets: np.ndarray
+    fit: np.ndarray
+    placed: np.ndarray
 
     def take(self, rows: np.ndarray) -> Evidence:
         """Return the evidence of some of the points."""
-        return Evidence(self.features[rows], self.sheets[rows])
+        return Evidence(self.features[rows], self.fit[rows], self.placed[rows])
 
-    def best_fit(self) -> tuple[np.ndarray, np.ndarray]:
-        """Choose for each point the fit that places its edge best, (M,) int64; and whether any does, (M,) bool.
-
-        The error of a line fitted to K points falls with the residual over the root of K: small fits win at curved and
-        crowded edges, large ones under noise.
-        """
-        count = len(FITS) * sheets.NUM_FEATURES
-        fits = self.features[:, NUM_CHEAP : NUM_CHEAP + count].reshape(-1, len(FITS), sheets.NUM_FEATURES)
-        residual, turn, away = (fits[:, :, i].astype(np.float64) for i in (2, 3, 5))
-        error = (np.exp(residual) - 0.01 + _FLOOR) / np.sqrt([count for count, _ in FITS])
-        error[(away > MAX_AWAY) | ~(turn > MIN_TURN)] = np.inf
-        best = error.argmin(axis=1)
-        return best, np.isfinite(error[np.arange(len(error)), best])
+    @staticmethod
+    def join(parts: Sequence[Evidence]) -> Evidence:
+        """Put the points of several together; of none, an empty one."""
+        nothing = Evidence(
+            np.zeros((0, NUM_COSTLY), np.float32), np.zeros((0, sheets.SHEETS), np.float32), np.zeros(0, bool)
+        )
+        names = Evidence.__dataclass_fields__
+        return Evidence(*(np.concatenate([getattr(part, name) for part in (nothing, *parts)]) for name in names))
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +196,23 @@ def examine(index: NeighborIndex, surveyed: Survey, xyz: np.ndarray) -> Evidence
             features,
             found,
         )
-    return Evidence(features, found)
+    best, placed = _best_fit(features)
+    return Evidence(features, found[np.arange(len(best)), best], placed)
+
+
+def _best_fit(features: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Choose for each point the fit that places its edge best, (M,) int64; and whether any does, (M,) bool.
+
+    The error of a line fitted to K points falls with the residual over the root of K: small fits win at curved and
+    crowded edges, large ones under noise.
+    """
+    count = len(FITS) * sheets.NUM_FEATURES
+    fits = features[:, NUM_CHEAP : NUM_CHEAP + count].reshape(-1, len(FITS), sheets.NUM_FEATURES)
+    residual, turn, away = (fits[:, :, i].astype(np.float64) for i in (2, 3, 5))
+    error = (np.exp(residual) - 0.01 + _FLOOR) / np.sqrt([count for count, _ in FITS])
+    error[(away > MAX_AWAY) | ~(turn > MIN_TURN)] = np.inf
+    best = error.argmin(axis=1)
+    return best, np.isfinite(error[np.arange(len(error)), best])
 
 
 def look_around(
@@ -220,11 +235,9 @@ def look_around(
     """
     chances = np.zeros((2, len(index)), np.float32)
     chances[:, places] = crease, outline
-    best, known = evidence.best_fit()
-    fits = evidence.sheets[np.arange(len(best)), best]
     slot = np.full(len(index), -1, np.int32)
-    slot[places[known]] = np.flatnonzero(known)
-    lines, feet = np.ascontiguousarray(fits[:, 6:9]), np.ascontiguousarray(fits[:, 9:12])
+    slot[places[evidence.placed]] = np.flatnonzero(evidence.placed)
+    lines, feet = np.ascontiguousarray(evidence.fit[:, 6:9]), np.ascontiguousarray(evidence.fit[:, 9:12])
     around = np.zeros((2, len(places), context.NUM_FEATURES), np.float32)
     if len(places):
         queries = build_index(np.ascontiguousarray(index.xyz[:, places].T))
@@ -257,11 +270,8 @@ def judge(index: NeighborIndex, surveyed: Survey) -> Verdict:
         kept.append(places[good])
         chances.append(first[:, good])
         parts.append(evidence.take(good))
-    if not parts:
-        nothing = Evidence(np.zeros((0, NUM_COSTLY), np.float32), np.zeros((0, len(FITS), sheets.SHEETS), np.float32))
-        return Verdict(np.zeros(0, np.int64), np.zeros(0), np.zeros(0), nothing)
-    places, first = np.concatenate(kept), np.concatenate(chances, axis=1)
-    evidence = Evidence(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("features", "sheets")))
+    places = np.concatenate([np.zeros(0, np.int64), *kept])
+    first, evidence = np.concatenate([np.zeros((2, 0)), *chances], axis=1), Evidence.join(parts)
     features = look_around(index, places, evidence, first[0], first[1])
     rows = index.order[places]
     order = np.argsort(rows)

@@ -54,16 +54,15 @@ class Faces:
 
 
 def faces(evidence: Evidence, xyz: np.ndarray, viewpoint: np.ndarray | None) -> Faces:
-    """Describe the edge at each point (M, 3) by the fit that places it best (`Evidence.best_fit`).
+    """Describe the edge at each point (M, 3) by the fit that places it best (`Evidence.fit`).
 
     Normals are turned towards the viewpoint, or upwards (+Z) without one.
     """
-    best, known = evidence.best_fit()
-    found = evidence.sheets[np.arange(len(best)), best].astype(np.float64)
+    found = evidence.fit.astype(np.float64)
     a, b, line, foot, middle_a, middle_b = (found[:, i : i + 3] for i in (0, 3, 6, 9, 14, 17))
     wing_a, wing_b = _wing(middle_a - foot, line), _wing(middle_b - foot, line)
     turn = math.pi - np.arccos(np.clip((wing_a * wing_b).sum(axis=1), -1, 1))
-    known &= turn > MIN_TURN
+    known = evidence.placed & (turn > MIN_TURN)
     # Turned so that each normal points away from the other face's wing, both lie on the outside of the wedge.
     a, b = _away_from(a, wing_b), _away_from(b, wing_a)
     out = a + b
