@@ -22,7 +22,7 @@ LAYERS = [
     {"project", "evidence", "edges", "raster", "color"},
     {"facets", "viewing"},
     {"outline"},
-    {"metrics"},
+    {"metrics", "palette"},
     {"paper"},
     {"detect"},
 ]
