@@ -140,6 +140,31 @@ def choose_frame(placed: np.ndarray, size: tuple[int, int], *, margin: float, cr
     return Frame(int(width), int(height), float(left), float(top), pixel)
 
 
+def detail_frame(camera: Camera, place: Any, extent: float, size: tuple[int, int]) -> Frame:
+    """Frame the surroundings of a place.
+
+    Parameters
+    ----------
+    camera : Camera
+    place : (3,) array_like
+        What is in the middle of the picture, in the cloud's frame.
+    extent : float
+        Width of the picture at that place, in the cloud's unit.
+    size : (int, int)
+        Width and height, in pixels.
+
+    Raises
+    ------
+    ValueError
+        If the place lies behind the viewer, or there is no width.
+    """
+    x, y, distance = camera.place(as_vector(place, "detail")[None])[0]
+    if not extent > 0 or np.isnan(x):
+        raise ValueError(f"detail: expected a place before the viewer and a width above 0, got {place!r}, {extent!r}")
+    pixel = float(extent) / size[0] / (1.0 if camera.eye is None else distance)
+    return Frame(size[0], size[1], x - pixel * size[0] / 2, y + pixel * size[1] / 2, pixel)
+
+
 def _looking(away: np.ndarray, down: np.ndarray | None = None, eye: np.ndarray | None = None) -> Camera:
     """Look along a vector, with +Z up in the picture (+Y when looking along Z) unless told which way is down."""
     back = -away / np.linalg.norm(away)

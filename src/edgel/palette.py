@@ -2,7 +2,7 @@
 
 They are told apart with normal vision and without red, green or blue cones, from each other and from the greys of a
 shaded surface, on white and on black (`tests/test_palette.py` measures it). Kinds that belong together look related:
-the near and the far side of a depth step are two blues.
+the near and the far side of a depth step are a dark and a light blue.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import numpy as np
 from edgel.edges import EdgeKind
 
 KIND_COLORS: dict[EdgeKind, tuple[int, int, int]] = {
-    EdgeKind.BOUNDARY: (85, 17, 170),  # indigo
-    EdgeKind.OCCLUDING: (102, 102, 255),  # periwinkle
+    EdgeKind.BOUNDARY: (102, 102, 255),  # periwinkle, which stands out from the background beside it, light or dark
+    EdgeKind.OCCLUDING: (85, 17, 170),  # indigo
     EdgeKind.OCCLUDED: (85, 187, 255),  # sky
     EdgeKind.CREASE: (221, 51, 0),  # vermilion
     EdgeKind.COLOR: (238, 170, 0),  # amber
@@ -48,7 +48,7 @@ def kind_colors(kind: Any) -> np.ndarray:
     Examples
     --------
     >>> kind_colors([EdgeKind.CREASE, EdgeKind.CREASE | EdgeKind.BOUNDARY]).tolist()
-    [[221, 51, 0], [85, 17, 170]]
+    [[221, 51, 0], [102, 102, 255]]
     """
     kind = np.asarray(kind)
     colors = np.tile(np.array(ANY_KIND, np.uint8), (len(kind), 1))

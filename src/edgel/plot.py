@@ -1,4 +1,4 @@
-"""Pictures of clouds, drawn with NumPy: a z-buffer of discs, shaded so that the shape is seen."""
+"""Pictures of clouds and their edges, drawn with NumPy: a z-buffer of discs, shaded so that the shape is seen."""
 
 from __future__ import annotations
 
@@ -9,14 +9,99 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from edgel.cloud import as_cloud, check_rows
+from edgel.edges import EdgeKind, Edges
 from edgel.io.files import replacing
+from edgel.legend import Entry, Strip
+from edgel.palette import ANY_KIND, KIND_COLORS, kind_colors, ramp_colors
 from edgel.scene import FINE, Scene
+from edgel.surface import SHEETS, Sheet, Surface
 
-EDGE_COLOR = (200, 0, 20)
-"""Red of the edge points, dark against the light greys, so that it is told apart without seeing red."""
+EDGE_COLORS = ("kind", "strength")
 ARROW_COLOR = (0, 60, 140)
 
 _PALE = (180, 244)  # greys of the darkest and the lightest slope where arrows shall stand out
+
+
+def picture(
+    points: Any,
+    edges: Edges | None = None,
+    *,
+    direction: Any = "auto",
+    size: tuple[int, int] = (1200, 900),
+    crop: bool = False,
+    color_by: str = "grey",
+    edge_color: str = "kind",
+    background: str = "light",
+    legend: bool = True,
+    detail: tuple[Any, float] | None = None,
+) -> np.ndarray:
+    """Draw a cloud and its edges on top, with a legend and a scale bar.
+
+    Parameters
+    ----------
+    points : (N, 3) or (H, W, 3) array_like, Cloud, or an object that carries points
+        Points that are not finite are left out; a few far outliers may fall outside the picture.
+    edges : Edges, optional
+        Of these points. Those hidden behind nearer parts of the cloud are not drawn. ``edges.only("crease")`` and
+        ``edges.take(edges.strength > 0.9)`` choose some.
+    direction : {"auto", "top", "oblique", "sensor"} or (3,) array_like
+        ``"top"`` looks down -Z as the paper does, ``"sensor"`` from the cloud's viewpoint, ``"oblique"`` from the front
+        and above; ``"auto"`` takes the sensor's view where there is one. A vector points away from the viewer.
+    size : (int, int)
+        Width and height, in pixels.
+    crop : bool
+        Make the picture no larger than the cloud and the legend need.
+    color_by : {"grey", "rgb", "intensity", "height", "normals"}
+        Color of the surface: none but its shading; the colors or the intensity that the cloud carries; z, from violet to
+        green; or the slope, with x, y, z of the normal as red, green, blue.
+    edge_color : {"kind", "strength"}
+        Color of the edge points: `edgel.palette.KIND_COLORS`, or from light green (the weakest) to violet (the strongest).
+    background : {"light", "dark"}
+        What the picture is drawn on.
+    legend : bool
+        Say below the cloud what the colors mean, and how long things are: the bar in units of the cloud, in perspective
+        at half of what is seen.
+    detail : ((3,) array_like, float), optional
+        Show only what lies around a place, and how wide a piece, in the cloud's unit.
+
+    Returns
+    -------
+    (height, width, 3) uint8
+        RGB.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If `points` carries no finite coordinates or not what it shall be colored by, `edges` are of another cloud, or an
+        option is out of its range.
+
+    Examples
+    --------
+    >>> import numpy as np, edgel
+    >>> from edgel import plot
+    >>> x, y = np.meshgrid(np.arange(40.0), np.arange(40.0))
+    >>> roof = np.c_[x.ravel(), y.ravel(), -abs(x.ravel() - 20)]
+    >>> plot.save("roof.png", plot.picture(roof, edgel.detect(roof), size=(400, 300)))
+    """
+    for name, value, known in (("edge_color", edge_color, EDGE_COLORS), ("background", background, SHEETS)):
+        if value not in known:
+            raise ValueError(f"{name}: expected one of {', '.join(known)}, got {value!r}")
+    cloud, sheet = as_cloud(points), SHEETS[background]
+    if edges is not None and edges.num_points != len(cloud):
+        raise ValueError(f"edges: they are of {edges.num_points:,} points, the cloud has {len(cloud):,}; draw them on it")
+    surface = Surface(cloud, color_by, sheet)
+    colors, entries = _edge_colors(edges, edge_color)
+    strip = Strip(entries + surface.entries, size[0]) if legend else None
+    room = size[1] - (strip.height if strip else 0)
+    if strip and (room < size[1] / 2 or not strip.fits):
+        raise ValueError(f"size: a picture of {size[0]} x {size[1]} has no room for its legend; enlarge it, or legend=False")
+    scene = Scene(cloud, direction=direction, size=(size[0], room), crop=crop, margin=0.03, detail=detail)
+    fine = surface.paint(scene)
+    if edges is not None:
+        shown = scene.on_top(edges.index)
+        fine[shown >= 0] = colors[shown[shown >= 0]]
+    drawn = _reduced(Image.fromarray(fine))
+    return drawn if strip is None else _with_strip(drawn, strip, scene, sheet, size[0])
 
 
 def render(
@@ -75,7 +160,7 @@ def render(
     scene = Scene(points, direction=direction, size=size, crop=crop, margin=margin, point_radius=point_radius)
     picture = _greys(scene, scene.shaded_by_slope() if normals is None else scene.shaded_by_normal(normals), greys)
     if rows_on_top is not None:
-        picture[scene.on_top(check_rows(rows_on_top, scene.num_input))] = EDGE_COLOR
+        picture[scene.on_top(check_rows(rows_on_top, scene.num_input)) >= 0] = ANY_KIND
     return _reduced(Image.fromarray(picture))
 
 
@@ -121,7 +206,7 @@ def arrows(
         raise ValueError(f"normals: expected ({len(rows)}, 3), one for each point in red, got {normals.shape}")
     scene = Scene(points, direction=direction, size=size, crop=crop, margin=length, point_radius=None)
     picture = _greys(scene, scene.shaded_by_slope(), _PALE)
-    picture[scene.on_top(rows)] = EDGE_COLOR
+    picture[scene.on_top(rows) >= 0] = ANY_KIND
     image = Image.fromarray(picture)
     unit = min(scene.width, scene.height)
     known = np.flatnonzero(np.isfinite(normals).all(axis=1))
@@ -141,6 +226,34 @@ def save(path: str | os.PathLike[str], picture: np.ndarray) -> None:
     """
     with replacing(path) as file:
         Image.fromarray(picture).save(file, format="PNG", optimize=True)
+
+
+def _edge_colors(edges: Edges | None, edge_color: str) -> tuple[np.ndarray, list[Entry]]:
+    """Colors (E, 3) of the edge points, and what the legend has to say of them."""
+    if edges is None:
+        return np.empty((0, 3), np.uint8), []
+    if edge_color == "kind":
+        counts = edges.count_kinds()
+        used = [kind for kind in KIND_COLORS if str(kind.name).lower() in counts]
+        entries = [_kind_entry(kind, counts[str(kind.name).lower()]) for kind in used]
+        return kind_colors(edges.kind), entries
+    low, high = (edges.strength.min(), edges.strength.max()) if len(edges) else (0.0, 1.0)
+    share = (edges.strength - low) / (high - low) if high > low else np.ones(len(edges))
+    # Surfaces are light: what is strong shall be dark.
+    ramp = ramp_colors(np.linspace(1, 0, 32))
+    return ramp_colors(1.0 - share), [Entry(ramp, f"{high:.2f}", f"strength {low:.2f}")]
+
+
+def _kind_entry(kind: EdgeKind, count: int) -> Entry:
+    return Entry(np.array([KIND_COLORS[kind]], np.uint8), f"{str(kind.name).lower()} {count:,}")
+
+
+def _with_strip(drawn: np.ndarray, strip: Strip, scene: Scene, sheet: Sheet, width: int) -> np.ndarray:
+    """Put legend and scale bar below a picture, in the middle of `width` pixels."""
+    canvas = Image.new("RGB", (width, len(drawn) + strip.height), sheet.paper)
+    canvas.paste(Image.fromarray(drawn), ((width - drawn.shape[1]) // 2, 0))
+    strip.draw(canvas, len(drawn), sheet.ink, *scene.scale())
+    return np.asarray(canvas)
 
 
 def _greys(scene: Scene, shade: np.ndarray, greys: tuple[int, int]) -> np.ndarray:
