@@ -439,7 +439,7 @@ def test_demo(tmp_path):
 def test_no_command_shows_help():
     assert "detect" in run().output
     assert run("--version").stdout.startswith("edgel 0.")
-    for command in ("detect", "normals", "info", "convert", "demo"):
+    for command in ("detect", "normals", "info", "convert", "render", "demo"):
         page = run(command, "--help").stdout
         assert f"edgel {command}" in page
         assert "Examples:" in page

@@ -27,7 +27,18 @@ LAYERS = [
     {"detect"},
 ]
 ONLY_CLOUD = {"io"}  # formats know the cloud (and the threads) and nothing else
-FREE = {"synth", "plot", "scene", "camera", "report", "demo", "cli", "figures"}  # on top: may use everything above
+FREE = {
+    "synth",
+    "plot",
+    "scene",
+    "camera",
+    "surface",
+    "legend",
+    "report",
+    "demo",
+    "cli",
+    "figures",
+}  # on top: may use everything above
 
 
 def _room(path: Path) -> str:

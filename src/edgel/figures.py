@@ -13,6 +13,7 @@ import numpy as np
 from edgel import plot
 from edgel.cloud import Cloud, check_points
 from edgel.edges import Edges
+from edgel.palette import ANY_KIND
 from edgel.paper import PaperEdges
 from edgel.synth import Part
 
@@ -190,7 +191,7 @@ def _figure_4(cloud: Cloud, edges: Edges, name: str) -> _Content:
     caption = f"Figure 4. {name}: the point cloud in grey and its edge points in red{view}."
     legend = [
         ((190, 190, 190), f"point cloud: {edges.num_points:,} points"),
-        (plot.EDGE_COLOR, f"edge points: {len(edges):,} ({edges.share:.1%})"),
+        (ANY_KIND, f"edge points: {len(edges):,} ({edges.share:.1%})"),
     ]
     return _Content(4, caption, [_Panel(image)], legend)
 
@@ -203,7 +204,7 @@ def _figure_5(cloud: Cloud, edges: Edges, name: str) -> _Content:
         caption += " As in the paper they are turned so that D > 0 (eq. 20), which is not always outwards."
     if edges.num_without_normal:
         caption += f" {edges.num_without_normal:,} edge points have no normal: their neighbours span no plane."
-    legend = [(plot.EDGE_COLOR, f"edge points: {len(edges):,}"), (plot.ARROW_COLOR, "normals")]
+    legend = [(ANY_KIND, f"edge points: {len(edges):,}"), (plot.ARROW_COLOR, "normals")]
     return _Content(5, caption, [_Panel(image)], legend)
 
 

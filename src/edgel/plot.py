@@ -52,10 +52,10 @@ def picture(
     crop : bool
         Make the picture no larger than the cloud and the legend need.
     color_by : {"grey", "rgb", "intensity", "height", "normals"}
-        Color of the surface: none but its shading; the colors or the intensity that the cloud carries; z, from violet to
-        green; or the slope, with x, y, z of the normal as red, green, blue.
+        Color of the surface: none but its shading; the colors or the intensity that the cloud carries; z, from violet
+        to green; or the slope, with x, y, z of the normal as red, green, blue.
     edge_color : {"kind", "strength"}
-        Color of the edge points: `edgel.palette.KIND_COLORS`, or from light green (the weakest) to violet (the strongest).
+        Color of the edge points: `edgel.palette.KIND_COLORS`, or from light green, the weakest, to violet.
     background : {"light", "dark"}
         What the picture is drawn on.
     legend : bool
@@ -72,8 +72,8 @@ def picture(
     Raises
     ------
     TypeError, ValueError
-        If `points` carries no finite coordinates or not what it shall be colored by, `edges` are of another cloud, or an
-        option is out of its range.
+        If `points` carries no finite coordinates or not what it shall be colored by, `edges` are of another cloud, an
+        option is out of its range, or the legend leaves no room for the cloud.
 
     Examples
     --------
@@ -88,13 +88,15 @@ def picture(
             raise ValueError(f"{name}: expected one of {', '.join(known)}, got {value!r}")
     cloud, sheet = as_cloud(points), SHEETS[background]
     if edges is not None and edges.num_points != len(cloud):
-        raise ValueError(f"edges: they are of {edges.num_points:,} points, the cloud has {len(cloud):,}; draw them on it")
+        raise ValueError(f"edges: found in a cloud of {edges.num_points:,} points, this one has {len(cloud):,}")
     surface = Surface(cloud, color_by, sheet)
     colors, entries = _edge_colors(edges, edge_color)
     strip = Strip(entries + surface.entries, size[0]) if legend else None
     room = size[1] - (strip.height if strip else 0)
     if strip and (room < size[1] / 2 or not strip.fits):
-        raise ValueError(f"size: a picture of {size[0]} x {size[1]} has no room for its legend; enlarge it, or legend=False")
+        raise ValueError(
+            f"size: {size[0]} x {size[1]} has no room for the legend; choose a larger one, or legend=False"
+        )
     scene = Scene(cloud, direction=direction, size=(size[0], room), crop=crop, margin=0.03, detail=detail)
     fine = surface.paint(scene)
     if edges is not None:

@@ -177,17 +177,21 @@ class Scene:
 
     def _splat(self, which: np.ndarray, radius: float) -> np.ndarray:
         """Draw points as discs and say which shows in each fine pixel, the nearest; -1 where none."""
-        far_first = self._far_first(which[self._inside[which]])
         rim = int(np.ceil(radius))
-        wide = self.width + 2 * rim
-        winner = np.full((self.height + 2 * rim) * wide, -1, np.int64)
-        pixel = (self.downs[far_first].astype(np.int64) + rim) * wide + self.columns[far_first].astype(np.int64) + rim
+        x, y = self.columns[which], self.downs[which]
+        # Discs of points a little outside reach into the picture.
+        which = which[(x >= -rim) & (x < self.width + rim) & (y >= -rim) & (y < self.height + rim)]
+        far_first = self._far_first(which)
+        wide = self.width + 4 * rim
+        winner = np.full((self.height + 4 * rim) * wide, -1, np.int64)
+        row, column = (np.floor(at[far_first]).astype(np.int64) + 2 * rim for at in (self.downs, self.columns))
+        pixel = row * wide + column
         winner[pixel] = far_first  # what is written last, the nearest, stays
         shown = winner[pixel] == far_first  # points hidden in their own pixel need no disc
         down, right = np.mgrid[-rim : rim + 1, -rim : rim + 1]
         disc = (down * wide + right)[down**2 + right**2 <= radius**2]
         winner[(pixel[shown, None] + disc).ravel()] = far_first[shown].repeat(len(disc))
-        return winner.reshape(-1, wide)[rim : rim + self.height, rim : rim + self.width]
+        return winner.reshape(-1, wide)[2 * rim : 2 * rim + self.height, 2 * rim : 2 * rim + self.width]
 
     def _far_first(self, which: np.ndarray) -> np.ndarray:
         """Sort points by their distance; of some as near the lowest in the picture comes last, whatever their order."""

@@ -16,7 +16,7 @@ from edgel.cli.errors import ExitCode, Failure, as_option, exit_codes, failing_a
 from edgel.cli.output import count, print_json, print_line, print_table, seconds
 from edgel.cli.progress import Watch
 from edgel.detect import PRESETS
-from edgel.edges import ASKABLE, EdgeKind, Edges, as_kinds, kind_names
+from edgel.edges import EdgeKind, Edges, as_kinds
 from edgel.stages import Stages
 from edgel.viewing import METHODS
 
@@ -41,7 +41,7 @@ Examples:
 
 _SUSPICIOUS_SHARE = 0.5  # of edge points; CAD models sampled with known edges have 2 to 13 %
 
-_FUNCTIONS = {"default": edgel.detect, "paper": edgel.paper.detect}
+FUNCTIONS = {"default": edgel.detect, "paper": edgel.paper.detect}
 
 
 def detect(
@@ -50,28 +50,9 @@ def detect(
         str | None,
         typer.Option("-o", "--output", metavar="OUT", help="The cloud to write; - writes PLY to stdout."),
     ] = None,
-    preset: Annotated[
-        str, typer.Option(metavar="|".join(PRESETS), help="The method: edgel's own, or the published one.")
-    ] = options.default_of(edgel.detect, "preset"),
-    kinds: Annotated[
-        str | None,
-        options.option(
-            edgel.detect,
-            "kinds",
-            f"Kinds of edge to look for, commas between: {', '.join(kind_names(ASKABLE))}.",
-            metavar="NAMES",
-        ),
-    ] = None,
-    method: Annotated[
-        str | None,
-        options.option(
-            edgel.detect,
-            "method",
-            f"How to look at the cloud: {', '.join(METHODS[:-1])} or {METHODS[-1]}. Surface takes any cloud, from any "
-            "side; organized goes along its rows and columns; the last three look at a projection; auto chooses.",
-            metavar="NAME",
-        ),
-    ] = None,
+    preset: options.Preset = options.PRESET,
+    kinds: options.Kinds = None,
+    method: options.Method = None,
     label_all: Annotated[
         bool, typer.Option("--all", help="Write the whole cloud, labelled; edge_kind is 0 where there is no edge.")
     ] = False,
@@ -123,7 +104,7 @@ def detect(
             with stages("reading"):
                 cloud = files.read_cloud(source, intrinsics)
             with failing_as(ExitCode.DATA, source, arguments(preset)):
-                edges = _FUNCTIONS[preset](cloud, **given, progress=watch)
+                edges = FUNCTIONS[preset](cloud, **given, progress=watch)
             stages.seconds.update(edges.seconds)
             if output is not None:
                 with stages("writing"):
@@ -168,7 +149,7 @@ def check_options(preset: str, given: dict[str, Any]) -> dict[str, Any]:
 
 def arguments(preset: str) -> set[str]:
     """Return the names of the arguments that a preset has beside the points."""
-    return set(inspect.signature(_FUNCTIONS[preset]).parameters) - {"points"}
+    return set(inspect.signature(FUNCTIONS[preset]).parameters) - {"points"}
 
 
 def check_outputs(output: str | None, report: str | None, *, label_all: bool, as_json: bool) -> None:
