@@ -30,10 +30,12 @@ ONLY_CLOUD = {"io"}  # formats know the cloud (and the threads) and nothing else
 FREE = {
     "synth",
     "plot",
+    "drawing",
     "scene",
     "camera",
     "surface",
     "legend",
+    "export",
     "report",
     "demo",
     "cli",

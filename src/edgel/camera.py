@@ -44,10 +44,11 @@ class Camera:
         The first two columns count right and up, in the cloud's unit or, in perspective, per unit of distance (NaN
         behind the eye); the third grows away from the viewer, in the cloud's unit.
         """
-        axes = np.column_stack([self.right, self.up, -self.back])
+        x, y, z = (xyz if self.eye is None else xyz - self.eye).T
+        # No matrix product: its rounding may depend on where in the array a point stands.
+        placed = np.column_stack([x * a + y * b + z * c for a, b, c in (self.right, self.up, -self.back)])
         if self.eye is None:
-            return xyz @ axes
-        placed = (xyz - self.eye) @ axes
+            return placed
         ahead = np.where(placed[:, 2] > 0, placed[:, 2], np.nan)
         return np.column_stack([placed[:, 0] / ahead, placed[:, 1] / ahead, ahead])
 

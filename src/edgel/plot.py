@@ -9,17 +9,15 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from edgel.cloud import as_cloud, check_rows
-from edgel.edges import EdgeKind, Edges
+from edgel.drawing import Drawing, reduced, sheet_of
+from edgel.edges import Edges
 from edgel.io.files import replacing
-from edgel.legend import Entry, Strip
-from edgel.palette import ANY_KIND, KIND_COLORS, kind_colors, ramp_colors
+from edgel.palette import ANY_KIND
 from edgel.scene import FINE, Scene
-from edgel.surface import SHEETS, Sheet, Surface
 
-EDGE_COLORS = ("kind", "strength")
-ARROW_COLOR = (0, 60, 140)
+ARROW_COLOR = (20, 105, 215)  # seen on pale surfaces, white and black
 
-_PALE = (180, 244)  # greys of the darkest and the lightest slope where arrows shall stand out
+_PALE = {"light": (180, 244), "dark": (150, 214)}  # greys of the slopes where arrows shall stand out
 
 
 def picture(
@@ -83,27 +81,8 @@ def picture(
     >>> roof = np.c_[x.ravel(), y.ravel(), -abs(x.ravel() - 20)]
     >>> plot.save("roof.png", plot.picture(roof, edgel.detect(roof), size=(400, 300)))
     """
-    for name, value, known in (("edge_color", edge_color, EDGE_COLORS), ("background", background, SHEETS)):
-        if value not in known:
-            raise ValueError(f"{name}: expected one of {', '.join(known)}, got {value!r}")
-    cloud, sheet = as_cloud(points), SHEETS[background]
-    if edges is not None and edges.num_points != len(cloud):
-        raise ValueError(f"edges: found in a cloud of {edges.num_points:,} points, this one has {len(cloud):,}")
-    surface = Surface(cloud, color_by, sheet)
-    colors, entries = _edge_colors(edges, edge_color)
-    strip = Strip(entries + surface.entries, size[0]) if legend else None
-    room = size[1] - (strip.height if strip else 0)
-    if strip and (room < size[1] / 2 or not strip.fits):
-        raise ValueError(
-            f"size: {size[0]} x {size[1]} has no room for the legend; choose a larger one, or legend=False"
-        )
-    scene = Scene(cloud, direction=direction, size=(size[0], room), crop=crop, margin=0.03, detail=detail)
-    fine = surface.paint(scene)
-    if edges is not None:
-        shown = scene.on_top(edges.index)
-        fine[shown >= 0] = colors[shown[shown >= 0]]
-    drawn = _reduced(Image.fromarray(fine))
-    return drawn if strip is None else _with_strip(drawn, strip, scene, sheet, size[0])
+    look = {"direction": direction, "size": size, "crop": crop, "color_by": color_by, "edge_color": edge_color}
+    return Drawing(points, edges, **look, legend=legend, detail=detail).on(background)
 
 
 def render(
@@ -117,6 +96,7 @@ def render(
     normals: Any = None,
     point_radius: float | None = None,
     greys: tuple[int, int] = (105, 232),
+    background: str = "light",
 ) -> np.ndarray:
     """Draw a cloud in grey, and some of its points in red on top of it (fig. 4 of the paper).
 
@@ -141,11 +121,13 @@ def render(
         Radius of a point, in pixels; by default chosen from the spacing, so that dense clouds have no holes.
     greys : (int, int)
         Grey of the darkest and of the lightest slope, 0 to 255.
+    background : {"light", "dark"}
+        What the picture is drawn on.
 
     Returns
     -------
     (height, width, 3) uint8
-        RGB, white where there is nothing.
+        RGB.
 
     Raises
     ------
@@ -160,10 +142,12 @@ def render(
     (300, 400, 3)
     """
     scene = Scene(points, direction=direction, size=size, crop=crop, margin=margin, point_radius=point_radius)
-    picture = _greys(scene, scene.shaded_by_slope() if normals is None else scene.shaded_by_normal(normals), greys)
+    picture = _greys(
+        scene, scene.shaded_by_slope() if normals is None else scene.shaded_by_normal(normals), greys, background
+    )
     if rows_on_top is not None:
         picture[scene.on_top(check_rows(rows_on_top, scene.num_input)) >= 0] = ANY_KIND
-    return _reduced(Image.fromarray(picture))
+    return reduced(Image.fromarray(picture))
 
 
 def arrows(
@@ -176,12 +160,13 @@ def arrows(
     crop: bool = False,
     spacing: float = 0.035,
     length: float = 0.08,
+    background: str = "light",
 ) -> np.ndarray:
     """Draw a cloud in grey, points of it in red, and the normals of an even selection of those as arrows (fig. 5).
 
     Parameters
     ----------
-    points, direction, size, crop
+    points, direction, size, crop, background
         As for `render`.
     at : (E,) int or (N,) bool
         Rows of the points in red.
@@ -195,7 +180,7 @@ def arrows(
     Returns
     -------
     (height, width, 3) uint8
-        RGB, white where there is nothing.
+        RGB.
 
     Raises
     ------
@@ -207,7 +192,7 @@ def arrows(
     if normals.shape != (len(rows), 3):
         raise ValueError(f"normals: expected ({len(rows)}, 3), one for each point in red, got {normals.shape}")
     scene = Scene(points, direction=direction, size=size, crop=crop, margin=length, point_radius=None)
-    picture = _greys(scene, scene.shaded_by_slope(), _PALE)
+    picture = _greys(scene, scene.shaded_by_slope(), _PALE[background], background)
     picture[scene.on_top(rows) >= 0] = ANY_KIND
     image = Image.fromarray(picture)
     unit = min(scene.width, scene.height)
@@ -215,7 +200,7 @@ def arrows(
     chosen, starts = scene.spread(rows[known], spacing * unit)
     along = normals[known[chosen]] @ np.column_stack([scene.camera.right, -scene.camera.up])
     _draw_arrows(ImageDraw.Draw(image), starts, starts + along * length * unit, max(1.4 * FINE, unit / 360))
-    return _reduced(image)
+    return reduced(image)
 
 
 def save(path: str | os.PathLike[str], picture: np.ndarray) -> None:
@@ -230,38 +215,12 @@ def save(path: str | os.PathLike[str], picture: np.ndarray) -> None:
         Image.fromarray(picture).save(file, format="PNG", optimize=True)
 
 
-def _edge_colors(edges: Edges | None, edge_color: str) -> tuple[np.ndarray, list[Entry]]:
-    """Colors (E, 3) of the edge points, and what the legend has to say of them."""
-    if edges is None:
-        return np.empty((0, 3), np.uint8), []
-    if edge_color == "kind":
-        counts = edges.count_kinds()
-        used = [kind for kind in KIND_COLORS if str(kind.name).lower() in counts]
-        entries = [_kind_entry(kind, counts[str(kind.name).lower()]) for kind in used]
-        return kind_colors(edges.kind), entries
-    low, high = (edges.strength.min(), edges.strength.max()) if len(edges) else (0.0, 1.0)
-    share = (edges.strength - low) / (high - low) if high > low else np.ones(len(edges))
-    # Surfaces are light: what is strong shall be dark.
-    ramp = ramp_colors(np.linspace(1, 0, 32))
-    return ramp_colors(1.0 - share), [Entry(ramp, f"{high:.2f}", f"strength {low:.2f}")]
-
-
-def _kind_entry(kind: EdgeKind, count: int) -> Entry:
-    return Entry(np.array([KIND_COLORS[kind]], np.uint8), f"{str(kind.name).lower()} {count:,}")
-
-
-def _with_strip(drawn: np.ndarray, strip: Strip, scene: Scene, sheet: Sheet, width: int) -> np.ndarray:
-    """Put legend and scale bar below a picture, in the middle of `width` pixels."""
-    canvas = Image.new("RGB", (width, len(drawn) + strip.height), sheet.paper)
-    canvas.paste(Image.fromarray(drawn), ((width - drawn.shape[1]) // 2, 0))
-    strip.draw(canvas, len(drawn), sheet.ink, *scene.scale())
-    return np.asarray(canvas)
-
-
-def _greys(scene: Scene, shade: np.ndarray, greys: tuple[int, int]) -> np.ndarray:
-    """Paint the shade of a scene between two greys, on white, (height, width, 3) uint8."""
+def _greys(scene: Scene, shade: np.ndarray, greys: tuple[int, int], background: str) -> np.ndarray:
+    """Paint the shade of a scene between two greys, (height, width, 3) uint8."""
     levels = (greys[0] + (greys[1] - greys[0]) * shade + 0.5).astype(np.uint8)
-    return np.where(scene.covered, levels, np.uint8(255))[..., None].repeat(3, axis=2)
+    painted = levels[..., None].repeat(3, axis=2)
+    painted[~scene.covered] = sheet_of(background).paper
+    return painted
 
 
 def _draw_arrows(draw: ImageDraw.ImageDraw, starts: np.ndarray, stops: np.ndarray, width: float) -> None:
@@ -279,8 +238,3 @@ def _draw_arrows(draw: ImageDraw.ImageDraw, starts: np.ndarray, stops: np.ndarra
         draw.polygon(
             [tuple(stop), tuple(neck + 0.4 * head * across), tuple(neck - 0.4 * head * across)], fill=ARROW_COLOR
         )
-
-
-def _reduced(fine: Image.Image) -> np.ndarray:
-    """Average the fine pixels of each pixel, (H, W, 3) uint8."""
-    return np.asarray(fine.reduce(FINE))

@@ -16,7 +16,8 @@ _AMBIENT = 0.5  # how far round the light reaches, so that slopes away from it s
 _DISC = 1.2  # radius of a disc in point spacings: neighbours overlap even round a missing point
 _LARGEST = 1 / 110  # largest radius of a disc, as a share of the picture's smaller side: no blots
 _BEAD = 0.7  # radius of a disc on top, as a share of the others': a row of edge points is a string of beads
-_LINE = 1 / 650  # least radius of a disc on top, in the same share: edges of dense clouds are lines, no hairs
+_LINE = 1 / 650  # least radius of a disc on top, as a share of the picture's smaller side, and never below a pixel:
+# edges of dense clouds are lines, no hairs
 _THROUGH = 6.0  # how far behind what covers them, in spacings, points on top still show
 _STEEPEST = 0.03  # the same at least, as a share of the picture's smaller side: outlines of dense clouds are that steep
 
@@ -132,7 +133,7 @@ class Scene:
             Places among `rows`; -1 where none shows.
         """
         finite, places = self._finite(rows)
-        winner = self._unhidden(finite, max(_BEAD * self.radius, _LINE * min(self.width, self.height)))
+        winner = self._unhidden(finite, max(_BEAD * self.radius, _LINE * min(self.width, self.height), FINE))
         place = np.full(len(self.rows), -1)
         place[finite] = places
         return np.where(winner >= 0, place[winner], -1)

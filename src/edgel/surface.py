@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel.cloud import Cloud
+from edgel.cloud import Cloud, check_points
 from edgel.color.channels import intensity_of, rgb_of
 from edgel.legend import Entry
 from edgel.palette import ramp_colors
@@ -16,7 +16,7 @@ COLOR_BY = ("grey", "rgb", "intensity", "height", "normals")
 
 _TAIL = 1.0  # percent of the heights at either end that share the ramp's end colors
 _DARKEST = 0.62  # what is left of a color on the slope that gets least light
-_PALE = 0.45  # share of the sheet's grey in the colors of a surface, so that edges stand out
+_PALE, _PALE_GREY = 0.45, 225  # share of this grey in the colors of a surface, so that edges stand out
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,6 @@ class Surface:
     cloud : Cloud
     color_by : str
         One of `COLOR_BY`.
-    sheet : Sheet
 
     Attributes
     ----------
@@ -63,34 +62,34 @@ class Surface:
         If `color_by` is unknown, or the cloud does not carry it.
     """
 
-    def __init__(self, cloud: Cloud, color_by: str, sheet: Sheet) -> None:
+    def __init__(self, cloud: Cloud, color_by: str) -> None:
         if color_by not in COLOR_BY:
             raise ValueError(f"color_by: expected one of {', '.join(COLOR_BY)}, got {color_by!r}")
         self.entries: list[Entry] = []
-        self._color_by, self._sheet = color_by, sheet
+        self._color_by = color_by
         self._colors = np.empty((0, 3))  # one a point, 0 to 255; grey and normals come from the picture
         if color_by == "height":
             heights = cloud.xyz[:, 2]
-            low, high = np.percentile(heights[np.isfinite(cloud.xyz).all(axis=1)], [_TAIL, 100.0 - _TAIL])
-            self._colors = ramp_colors((heights - low) / (high - low) if high > low else np.zeros(len(heights)))
-            ramp = _muted(ramp_colors(np.linspace(0, 1, 32)), np.ones(32), sheet)
+            low, high = np.percentile(check_points(cloud, minimum=1).xyz[:, 2], [_TAIL, 100.0 - _TAIL])
+            self._colors = ramp_colors(np.nan_to_num((heights - low) / (high - low or 1.0)))
+            ramp = _muted(ramp_colors(np.linspace(0, 1, 32)), np.ones(32))
             self.entries.append(Entry(ramp.astype(np.uint8), f"{high:.6g}", f"height {low:.6g}"))
         elif color_by in ("rgb", "intensity"):
             self._colors = _carried(cloud, color_by)
             if color_by == "rgb":
-                self._colors = _muted(self._colors, np.ones(len(cloud)), sheet)
+                self._colors = _muted(self._colors, np.ones(len(cloud)))
 
-    def paint(self, scene: Scene) -> np.ndarray:
+    def paint(self, scene: Scene, sheet: Sheet) -> np.ndarray:
         """Paint the scene of the cloud, (height, width, 3) uint8 at its fine pixels."""
-        sheet, shade = self._sheet, scene.shaded_by_slope()
+        shade = scene.shaded_by_slope()
         if self._color_by == "grey":
             colors = (sheet.greys[0] + (sheet.greys[1] - sheet.greys[0]) * shade)[..., None]
         elif self._color_by == "normals":
-            colors = _muted(127.5 * (1.0 + scene.normals_by_slope()), shade, sheet)
+            colors = _muted(127.5 * (1.0 + scene.normals_by_slope()), shade)
         else:
             colors = self._colors[scene.rows][scene.winner]
             if self._color_by == "height":
-                colors = _muted(colors, shade, sheet)
+                colors = _muted(colors, shade)
         painted = np.empty((*scene.covered.shape, 3), np.uint8)
         painted[...] = (colors + 0.5).astype(np.uint8)
         painted[~scene.covered] = sheet.paper
@@ -107,7 +106,7 @@ def _carried(cloud: Cloud, color_by: str) -> np.ndarray:
     return (values if values.ndim == 2 else values[:, None].repeat(3, axis=1)).astype(np.float32)
 
 
-def _muted(colors: np.ndarray, shade: np.ndarray, sheet: Sheet) -> np.ndarray:
+def _muted(colors: np.ndarray, shade: np.ndarray) -> np.ndarray:
     """Colors (..., 3), 0 to 255, darkened by the shade (...,) and paled."""
     lit = colors.astype(np.float32) * (_DARKEST + (1.0 - _DARKEST) * shade)[..., None]
-    return (1.0 - _PALE) * lit + _PALE * sheet.greys[1]
+    return (1.0 - _PALE) * lit + _PALE * _PALE_GREY

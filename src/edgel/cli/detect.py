@@ -111,7 +111,7 @@ def detect(
                     files.write_cloud(output, edges.label(cloud) if label_all else edges.cloud(cloud))
             if report is not None:
                 with stages("report"):
-                    page = report_on(source, cloud, edges, report)
+                    page = report_on(source, output, cloud, edges, report)
         if as_json:
             print_json(collect(source, output, page, edges, stages.seconds))
             return
@@ -164,13 +164,21 @@ def check_outputs(output: str | None, report: str | None, *, label_all: bool, as
         files.check_new_folder(report)
 
 
-def report_on(source: str, cloud: edgel.Cloud, edges: Edges, directory: str) -> Path:
-    """Write the report of one cloud and return its page."""
+def report_on(source: str, output: str | None, cloud: edgel.Cloud, edges: Edges, directory: str) -> Path:
+    """Write the report of one cloud, compared with what the other preset finds in it, and return its page."""
     from edgel.report import Case, write_report  # not at the top: Matplotlib takes time to import
 
     name = "stdin" if source == files.PIPE else Path(source).stem
+    (preset,) = set(PRESETS) - {edges.preset}
+    try:
+        other = edgel.detect(cloud, preset=preset)
+    except ValueError:  # what one preset can look at is too little for the other: nothing to compare
+        other = None
+    beside = {"the cloud": source, "what was written": output}
+    beside = {what: path for what, path in beside.items() if path not in (None, files.PIPE)}
     with failing_as(ExitCode.OUTPUT, directory):
-        return write_report([Case(name, cloud, edges)], directory, title=f"Edges of {name}")
+        case = Case(name, cloud, edges, other=other, files=beside)
+        return write_report([case], directory, title=f"Edges of {name}")
 
 
 def creases(edges: Edges) -> dict[str, Any]:

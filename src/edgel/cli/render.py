@@ -13,7 +13,8 @@ from edgel.cli.detect import FUNCTIONS, arguments, check_options
 from edgel.cli.errors import ExitCode, Failure, exit_codes, failing_as
 from edgel.cli.output import count, print_line, print_table, seconds
 from edgel.cli.progress import Watch
-from edgel.plot import EDGE_COLORS, picture, save
+from edgel.drawing import EDGE_COLORS
+from edgel.plot import picture, save
 from edgel.stages import Stages
 from edgel.surface import COLOR_BY, SHEETS
 
