@@ -14,7 +14,7 @@ FINE = 2  # samples along each axis of a pixel: everything below counts these fi
 _LIGHT = np.array([-0.30, 0.42, 0.86])  # towards the light: from the left, above, and behind the viewer
 _AMBIENT = 0.5  # how far round the light reaches, so that slopes away from it still differ
 _DISC = 1.2  # radius of a disc in point spacings: neighbours overlap even round a missing point
-_LARGEST = 1 / 110  # largest radius of a disc, as a share of the picture's smaller side: no blots
+_LARGEST, _LARGEST_IN_DETAIL = 1 / 110, 1 / 30  # radius of a disc, as a share of the picture's smaller side: no blots
 _BEAD = 0.7  # radius of a disc on top, as a share of the others': a row of edge points is a string of beads
 _LINE = 1 / 650  # least radius of a disc on top, as a share of the picture's smaller side, and never below a pixel:
 # edges of dense clouds are lines, no hairs
@@ -44,6 +44,8 @@ class Scene:
         From the viewer, in the cloud's unit, up to a constant.
     width, height : int
         Of the picture, in fine pixels.
+    spacing : float
+        Between points in the picture, in fine pixels.
     winner : (height, width) int64
         Which finite point shows; -1 where none.
     covered : (height, width) bool
@@ -79,9 +81,10 @@ class Scene:
         self._inside = (columns >= 0) & (columns < self.frame.width) & (downs >= 0) & (downs < self.frame.height)
         if not self._inside.any():
             raise ValueError("detail: no point of the cloud falls into the picture; choose a place on the cloud")
-        self._spacing = self._typical_spacing()
-        largest = max(_LARGEST * min(self.width, self.height), FINE)
-        self.radius = min(max(_DISC * self._spacing, 0.5), largest) if point_radius is None else FINE * point_radius
+        self.spacing = self._typical_spacing()
+        share = _LARGEST if detail is None else _LARGEST_IN_DETAIL
+        largest = max(share * min(self.width, self.height), FINE)
+        self.radius = min(max(_DISC * self.spacing, 0.5), largest) if point_radius is None else FINE * point_radius
         self.winner = self._splat(np.arange(len(placed)), self.radius)
         self.covered = self.winner >= 0
         self._depth = np.where(self.covered, self.distance[self.winner], np.nan)
@@ -110,7 +113,7 @@ class Scene:
         # At the resolution of the picture itself: four times as fast, and the outline stays that of the fine one.
         depth, covered = self._depth[::FINE, ::FINE], self.covered[::FINE, ::FINE]
         footprint = self._footprint(depth)
-        depth = _smoothed(depth, covered, int(np.ceil(1.5 * max(self._spacing, self.radius) / FINE)))
+        depth = _smoothed(depth, covered, int(np.ceil(1.5 * max(self.spacing, self.radius) / FINE)))
         down, right = np.gradient(depth)
         # Depth grows away from the viewer; a jump counts as a steep slope, no more.
         x, y = (np.clip(np.nan_to_num(step / footprint), -3.0, 3.0) for step in (right, -down))
@@ -203,7 +206,7 @@ class Scene:
 
     def _unhidden(self, which: np.ndarray, radius: float) -> np.ndarray:
         """Draw some of the points as `_splat` does, without those that lie behind what the picture shows."""
-        slack = _THROUGH * max(self._spacing, self.radius)
+        slack = _THROUGH * max(self.spacing, self.radius)
         steep = max(slack, _STEEPEST * min(self.width, self.height))
         size = self._footprint(self._depth) / FINE
         # First by the points' own pixels: through gaps of a nearer surface shreds of farther discs would shine.

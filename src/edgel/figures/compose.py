@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageDraw, ImageFont
 
 from edgel.surface import SHEETS, Sheet
 
@@ -22,12 +22,14 @@ Color = tuple[int, int, int]
 _DPI = 150
 _WIDTH, _TALLEST = 1600, 960  # pixels: of a figure, and of its panels
 _GAP, _TITLE, _AXES, _LEGEND, _LINE = 40, 56, 84, 60, 30  # pixels: beside, above and below the panels
+_SMALL = {"format": "WEBP", "lossless": True, "method": 2, "quality": 50}  # of the effort, not of the picture
+_LETTER = 20  # pixels: of the caption
 _RIM = 0.03  # free rim round a panel with axes, as a share of it
 
 
 @dataclass(frozen=True, eq=False)
 class FigureImage:
-    """A figure as PNG.
+    """A figure as it is written.
 
     Attributes
     ----------
@@ -36,15 +38,15 @@ class FigureImage:
     caption : str
     png : bytes
         On white, with the caption below the panels.
-    png_bare, png_dark : bytes
-        Without it, for a page that sets the caption itself: on white, and nearly black.
+    light, dark : bytes
+        Without it, for a page that sets the caption itself, as lossless WebP: half the size of a PNG.
     """
 
     number: int
     caption: str
     png: bytes
-    png_bare: bytes
-    png_dark: bytes
+    light: bytes
+    dark: bytes
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,26 +93,35 @@ class Content:
 
 def figure_image(content: Content) -> FigureImage:
     """Draw a figure on white and on black."""
-    light, dark = ([panel.image(background) for panel in content.panels] for background in ("light", "dark"))
-    return FigureImage(
-        content.number,
-        content.caption,
-        _compose(content, light, SHEETS["light"], caption=True),
-        _small(_compose(content, light, SHEETS["light"], caption=False)),
-        _small(_compose(content, dark, SHEETS["dark"], caption=False)),
+    light, dark = (
+        _compose(content, [panel.image(background) for panel in content.panels], SHEETS[background])
+        for background in ("light", "dark")
     )
+    captioned = _encoded(_with_caption(light, content.caption, SHEETS["light"]), format="PNG")
+    return FigureImage(content.number, content.caption, captioned, _encoded(light, **_SMALL), _encoded(dark, **_SMALL))
 
 
-def _small(png: bytes) -> bytes:
-    """Write a PNG with 256 colors, a third of the size: shades of grey, and few others."""
-    with Image.open(io.BytesIO(png)) as image, io.BytesIO() as file:
-        colors = image.convert("RGB").quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
-        colors.save(file, format="PNG", optimize=True)
+def _encoded(image: Image.Image, **form: Any) -> bytes:
+    with io.BytesIO() as file:
+        image.save(file, **form)
         return file.getvalue()
 
 
-def _compose(content: Content, images: Sequence[np.ndarray], sheet: Sheet, *, caption: bool) -> bytes:
-    """Set the panels side by side at one height, with titles, legend and caption, and return the PNG."""
+def _with_caption(image: Image.Image, caption: str, sheet: Sheet) -> Image.Image:
+    """Set the caption below a figure."""
+    font = ImageFont.load_default(_LETTER)
+    lines = textwrap.wrap(caption, 120)
+    canvas = Image.new("RGB", (image.width, image.height + _LINE * len(lines) + _GAP // 2), sheet.paper)
+    canvas.paste(image)
+    draw = ImageDraw.Draw(canvas)
+    for number, line in enumerate(lines):
+        place = (image.width / 2, image.height + _LINE * (number + 0.5))
+        draw.text(place, line, fill=sheet.ink, font=font, anchor="mm")
+    return canvas
+
+
+def _compose(content: Content, images: Sequence[np.ndarray], sheet: Sheet) -> Image.Image:
+    """Set the panels side by side at one height, with titles and legend."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -121,12 +132,11 @@ def _compose(content: Content, images: Sequence[np.ndarray], sheet: Sheet, *, ca
     # A picture is shown pixel for pixel where there is room: scaled up or a little down it would blur.
     natural = [len(image) for panel, image in zip(panels, images, strict=True) if not panel.raster]
     height = round(min((_WIDTH - 2 * _GAP - axes_strip - gaps) / sum(aspects), *(natural or [_TALLEST]), _TALLEST))
-    lines = textwrap.wrap(content.caption, 120) if caption else []
     above = _TITLE if any(panel.title for panel in panels) else _GAP // 2
-    below = axes_strip + _LEGEND * bool(content.legend) + _LINE * len(lines) + _GAP // 2 * (1 + bool(lines))
+    below = axes_strip + _LEGEND * bool(content.legend) + _GAP // 2
     total = above + height + below
     figure = Figure(figsize=(_WIDTH / _DPI, total / _DPI), dpi=_DPI, facecolor=_share(sheet.paper))
-    FigureCanvasAgg(figure)
+    canvas = FigureCanvasAgg(figure)
     ink = _share(sheet.ink)
     left = round((_WIDTH + axes_strip - height * sum(aspects) - gaps) / 2)
     for panel, image, aspect in zip(panels, images, aspects, strict=True):
@@ -136,12 +146,8 @@ def _compose(content: Content, images: Sequence[np.ndarray], sheet: Sheet, *, ca
         left += width + _GAP + axes_strip
     if content.legend:
         _legend(figure, content.legend, (below - axes_strip - _LEGEND / 2) / total, ink)
-    for number, line in enumerate(reversed(lines)):
-        place = (0.5, (_GAP / 2 + _LINE * number) / total)
-        figure.text(*place, line, ha="center", va="bottom", fontsize=9.5, color=ink)
-    with io.BytesIO() as file:
-        figure.savefig(file, format="png", metadata={"Software": "edgel"})
-        return file.getvalue()
+    canvas.draw()
+    return Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy())
 
 
 def _show(axes: Axes, panel: Panel, image: np.ndarray, unit: str, ink: tuple[float, float, float]) -> None:

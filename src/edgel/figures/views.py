@@ -13,7 +13,8 @@ from edgel.figures.compose import Content, Panel
 from edgel.palette import KIND_COLORS
 from edgel.scene import FINE, Scene
 
-_CELLS = 9  # a detail is one of so many parts of the picture's width
+_PART = 1 / 9  # width of a detail, as a share of the whole
+_POINTS = 40  # that it has at least from side to side
 _DETAILS = 3
 _OVERVIEW, _DETAIL = (456, 342), (342, 342)  # as large as they are shown beside each other
 _HALF = (740, 600)
@@ -30,7 +31,7 @@ def figure_6(cloud: Cloud, edges: Edges, name: str) -> Content:
         drawing = Drawing(cloud, found, size=size, crop=True, legend=False)
         panels.append(Panel(drawing.on, f"{str(kind.name).lower()}: {len(found):,}"))
     caption = f"Figure 6. {name}: the edge points of each kind alone. A point of several kinds is in several panels."
-    return Content(6, caption, panels, kind_legend(edges))
+    return Content(6, caption, panels)
 
 
 def figure_8(cloud: Cloud, edges: Edges, name: str) -> Content:
@@ -63,11 +64,11 @@ def strongest(scene: Scene, edges: Edges) -> list[tuple[int, tuple[float, float,
     shown = scene.on_top(edges.index)
     downs, columns = np.nonzero(shown >= 0)
     strength = edges.strength[shown[downs, columns]]
-    cell = scene.width / _CELLS
+    cell = max(_PART * scene.width, min(_POINTS * scene.spacing, scene.width / 3))
     free = np.ones(len(downs), bool)
     chosen = []
     while free.any() and len(chosen) < _DETAILS:
-        cells = np.floor(downs / cell).astype(int) * _CELLS + np.floor(columns / cell).astype(int)
+        cells = np.floor(downs / cell).astype(int) * scene.width + np.floor(columns / cell).astype(int)
         best = np.bincount(cells[free], strength[free]).argmax()
         inside = free & (cells == best)
         middle = np.median(downs[inside]), np.median(columns[inside])
@@ -85,7 +86,7 @@ def figure_9(cloud: Cloud, edges: Edges, other: Edges, name: str) -> Content:
     for letter, one in zip("ab", sorted((edges, other), key=lambda one: one.preset), strict=True):
         panels.append(
             Panel(
-                Drawing(cloud, one, size=_HALF).on,
+                Drawing(cloud, one, size=_HALF, legend=False).on,
                 f"({letter}) {one.preset}: {len(one):,} edge points ({one.share:.1%})",
             )
         )

@@ -43,7 +43,7 @@ class Histogram:
 
 def strength_histogram(edges: Edges) -> Histogram:
     """How many edge points are how strong, by the first of their kinds."""
-    bins = np.linspace(np.floor(10 * edges.strength.min()) / 10, 1.0, 41)
+    bins = np.linspace(min(np.floor(10 * edges.strength.min()) / 10, 0.9), 1.0, 41)
     stacks, left = [], np.ones(len(edges), bool)
     for kind, color in KIND_COLORS.items():
         here = left & ((edges.kind & int(kind)) > 0)
@@ -62,7 +62,7 @@ def angle_histogram(edges: Edges) -> Histogram | None:
     bins = np.linspace(0.0, 180.0, 37)
     counts = np.histogram(degrees, bins)[0]
     note = (
-        f"Of the {known.sum():,} creases whose faces are both known. Half turn by more than {np.median(degrees):.0f}."
+        f"Of the {known.sum():,} creases with both faces known; half turn more than {np.median(degrees):.0f} degrees."
     )
     axis = "turn from face to face (degrees)"
     return Histogram("Angle between the faces", axis, bins, [("crease", ANY_KIND, counts)], note)

@@ -55,12 +55,12 @@ def _by_interest(figures: Mapping[str, FigureImage]) -> list[tuple[str, FigureIm
 
 
 def _figure(figure: FigureImage, address: str) -> str:
-    light, dark = (base64.b64encode(png).decode() for png in (figure.png_bare, figure.png_dark))
+    light, dark = (base64.b64encode(image).decode() for image in (figure.light, figure.dark))
     alt = html.escape(figure.caption, quote=True)
     # A page printed from a dark screen is printed on white.
-    source = f'<source media="screen and (prefers-color-scheme: dark)" srcset="data:image/png;base64,{dark}">'
-    image = f'<picture>{source}<img src="data:image/png;base64,{light}" alt="{alt}"></picture>'
-    return f"<figure>{image}<figcaption>{html.escape(figure.caption)} {_link(address)}</figcaption></figure>"
+    source = f'<source media="screen and (prefers-color-scheme: dark)" srcset="data:image/webp;base64,{dark}">'
+    shown = f'<picture>{source}<img src="data:image/webp;base64,{light}" alt="{alt}"></picture>'
+    return f"<figure>{shown}<figcaption>{html.escape(figure.caption)} {_link(address)}</figcaption></figure>"
 
 
 def _link(address: str) -> str:
