@@ -17,9 +17,7 @@ PANEL = (800, 640)
 def main() -> None:
     data = Path(sys.argv[1]) if len(sys.argv) > 1 else Path("../shared/data")
     part = edgel.read(data / "truth" / "abc_7010.ply")
-    frame = edgel.read(
-        data / "structured_light" / "depth_0.npy", intrinsics=data / "structured_light" / "phoxi.intr"
-    )
+    frame = edgel.read(data / "structured_light" / "depth_0.npy", intrinsics=data / "structured_light" / "phoxi.intr")
     panels = [plot.picture(cloud, edgel.detect(cloud), size=PANEL) for cloud in (part, frame)]
     plot.save(Path(__file__).parent.parent / "docs" / "images" / "edges.png", np.hstack(panels))
 
