@@ -202,6 +202,21 @@ def test_the_surface_shows_what_it_is_colored_by(color_by, left, right):
             assert ("red", "green", "blue")[seen[side].argmax()] == name
 
 
+@pytest.mark.parametrize("color_by", ["rgb", "intensity", "height"])
+def test_points_that_are_not_finite_change_no_color(color_by):
+    cloud = colored()
+    rows = np.sort(np.r_[0, 5000, np.arange(len(cloud))])
+    holes = cloud.take(rows)
+    holes.xyz[[0, 5001]] = np.nan
+    look = {"direction": "top", "size": SIZE, "color_by": color_by}
+    np.testing.assert_array_equal(plot.picture(holes, **look), plot.picture(cloud, **look))
+
+
+def test_one_height_is_one_color():
+    picture = plot.picture(grid(step=0.25), direction="top", size=SIZE, color_by="height", legend=False)
+    assert len(np.unique(picture[100:260, 100:380].reshape(-1, 3), axis=0)) == 1
+
+
 def test_normals_are_colors():
     x, y = np.meshgrid(np.linspace(-1, 1, 200), np.linspace(-1, 1, 150))
     roof = np.column_stack([x.ravel(), y.ravel(), -np.abs(x.ravel())])

@@ -50,7 +50,8 @@ def strength_histogram(edges: Edges) -> Histogram:
         left &= ~here
         if here.any():
             stacks.append((str(kind.name).lower(), color, np.histogram(edges.strength[here], bins)[0]))
-    return Histogram("Strength", "strength", bins, stacks, "A point of several kinds counts with the first.")
+    note = "A point of several kinds counts with the first." if len(stacks) > 1 else ""
+    return Histogram("Strength", "strength", bins, stacks, note)
 
 
 def angle_histogram(edges: Edges) -> Histogram | None:

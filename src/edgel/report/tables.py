@@ -83,7 +83,7 @@ def preset_table(edges: Edges, other: Edges) -> Table:
     both = len(np.intersect1d(edges.index, other.index))
     share = both / (edges.num_points - edges.num_dropped)
     rows.append({"preset": "points of both", "edge points": both, "share": share, "seconds": None, "kinds": None})
-    note = f"The preset {other.preset} ran with its own defaults; {edges.preset} as asked for."
+    note = f"The preset {other.preset} was run to compare, with its own defaults."
     return Table("Both presets", rows, {"edge points": ",d", "share": ".1%", "seconds": ".2f"}, note)
 
 
