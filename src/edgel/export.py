@@ -27,15 +27,14 @@ _DRAWN = 20_000  # points of a cloud that Matplotlib draws behind its edges: mor
 
 def as_html(edges: Edges) -> str:
     """Return what a notebook shows of edges: a picture of the edge points alone, and their number by kind."""
-    rows = "".join(
-        f'<tr><td style="text-align:left"><span style="color:{as_hex(KIND_COLORS[kind])}">&#9632;</span> {name}</td>'
-        f"<td>{number:,}</td><td>{number / (edges.num_points - edges.num_dropped):.2%}</td></tr>"
-        for name, number in edges.count_kinds().items()
-        for kind in [EdgeKind[name.upper()]]
-    )
     shown = f"<div><p><b>{html.escape(repr(edges))}</b></p>"
     if not len(edges):
         return shown + "</div>"
+    rows = ""
+    for name, number in edges.count_kinds().items():
+        square = f'<span style="color:{as_hex(KIND_COLORS[EdgeKind[name.upper()]])}">&#9632;</span>'
+        share = number / (edges.num_points - edges.num_dropped)
+        rows += f'<tr><td style="text-align:left">{square} {name}</td><td>{number:,}</td><td>{share:.2%}</td></tr>'
     table = f"<table><tr><th>kind</th><th>edge points</th><th>of all points</th></tr>{rows}</table>"
     with io.BytesIO() as file:
         alone = replace(edges, index=np.arange(len(edges)), num_points=len(edges), num_dropped=0)

@@ -39,7 +39,7 @@ def figure_8(cloud: Cloud, edges: Edges, name: str) -> Content:
     scene = Scene(cloud, direction="auto", size=_OVERVIEW, crop=False, margin=0.03)
     places = strongest(scene, edges)
     boxes, panels = [], []
-    for letter, (row, box) in zip("bcdef", places, strict=False):
+    for letter, (row, box) in zip("bcd", places, strict=False):
         boxes.append((*box, letter))
         at = cloud.xyz[edges.index[row]]
         width = (box[2] - box[0]) * scene.frame.pixel
@@ -84,12 +84,8 @@ def figure_9(cloud: Cloud, edges: Edges, other: Edges, name: str) -> Content:
     """Make the answers of the two presets beside each other."""
     panels = []
     for letter, one in zip("ab", sorted((edges, other), key=lambda one: one.preset), strict=True):
-        panels.append(
-            Panel(
-                Drawing(cloud, one, size=_HALF, legend=False).on,
-                f"({letter}) {one.preset}: {len(one):,} edge points ({one.share:.1%})",
-            )
-        )
+        title = f"({letter}) {one.preset}: {len(one):,} edge points ({one.share:.1%})"
+        panels.append(Panel(Drawing(cloud, one, size=_HALF, legend=False).on, title))
     legend = list(dict.fromkeys(kind_legend(edges) + kind_legend(other)))
     return Content(9, f"Figure 9. {name}: what the two presets find, in one view.", panels, legend)
 

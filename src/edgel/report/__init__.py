@@ -115,8 +115,9 @@ def _histograms(edges: Edges) -> list[Histogram]:
 
 
 def _addresses(case: Case, folder: Path) -> list[tuple[str, str]]:
-    """What the files of a case hold, and where they lie as seen from the page."""
-    return [(what, Path(os.path.relpath(path, folder)).as_posix()) for what, path in case.files.items()]
+    """What the files of a case hold, and where they lie as seen from the page; none on another drive of Windows."""
+    near = {what: path for what, path in case.files.items() if Path(path).resolve().drive == folder.resolve().drive}
+    return [(what, Path(os.path.relpath(path, folder)).as_posix()) for what, path in near.items()]
 
 
 def make_directory(directory: str | os.PathLike[str]) -> Path:
