@@ -235,6 +235,26 @@ def nearest_points(pixels, depth, points):
     return shown
 
 
+def discs(columns, downs, distance, width, height, radius):
+    """Point that shows in each pixel when every point is a disc round the middle of its pixel: the nearest.
+
+    Points hidden in their own pixel have no disc. Of points as near, the lowest shows, then the rightmost.
+    """
+
+    def nearest(candidates):
+        return min(candidates, key=lambda p: (distance[p], -downs[p], -columns[p], p), default=-1)
+
+    pixel = [(math.floor(down), math.floor(column)) for down, column in zip(downs, columns, strict=True)]
+    every = range(len(pixel))
+    on_top = [p for p in every if nearest([q for q in every if pixel[q] == pixel[p]]) == p]
+    shown = np.empty((height, width), int)
+    for row in range(height):
+        for col in range(width):
+            over = [p for p in on_top if (pixel[p][0] - row) ** 2 + (pixel[p][1] - col) ** 2 <= radius**2]
+            shown[row, col] = nearest(over)
+    return shown
+
+
 def held(depth, close):
     """Pixels that at least 4 of their 24 neighbours hold: within `close`, or 3 median steps of the window more."""
     kept = np.full(depth.shape, np.nan)
