@@ -1,0 +1,172 @@
+"""The scene of the page: clouds, edge points, segments, drawn from the panes of a session."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import viser
+
+from edgel.edges import Edges
+from edgel.view.colors import cloud_colors, edge_colors
+from edgel.view.layout import FIELD_OF_VIEW, Layout, Place, lay_out
+from edgel.view.pick import Picked
+from edgel.view.scale import thin
+from edgel.view.select import in_box
+from edgel.view.session import LEAST_STRENGTH, Pane
+from edgel.view.settings import Settings
+
+_POINT = 1.3  # size of a point of the cloud, in spacings: no holes, and little drawn twice
+_EDGE = 2.2  # the same of an edge point, drawn on top of its neighbours
+_LEAST_EDGE = 0.007  # scene units: two pixels or three on a usual screen
+_SEGMENT = 0.05  # length of a segment, scene units
+_SEGMENT_CELL = 0.025  # at most one segment a cell of this size, scene units
+_TANGENT_COLOR, _NORMAL_COLORS = (0, 110, 40), ((20, 20, 20), (150, 95, 20))
+_MARK_COLOR = (255, 220, 0)
+
+
+class Canvas:
+    """Handles of what is drawn. Only one thread may call `draw` at a time."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        self._nodes: dict[str, Any] = {}
+        self._colored: dict[int, tuple[Any, np.ndarray]] = {}
+        self._laid_out: list[int] = []
+        self.layout: Layout | None = None
+        self.shown: list[np.ndarray] = []
+        server.initial_camera.fov = FIELD_OF_VIEW
+
+    def draw(self, panes: list[Pane], settings: Settings) -> None:
+        """Make the scene show these panes."""
+        if not panes:
+            return
+        sources = [id(pane.source) for pane in panes]
+        if sources != self._laid_out:
+            self._clear()
+            self.layout, self._laid_out = lay_out([pane.source for pane in panes]), sources
+            self.look()
+        assert self.layout is not None
+        shown = []
+        with self._server.atomic():
+            for number, (pane, place) in enumerate(zip(panes, self.layout.places, strict=True)):
+                self._draw_cloud(number, pane, place, settings)
+                shown.append(self._draw_edges(number, pane, place, settings))
+        self.shown = shown
+
+    def look(self, client: viser.ClientHandle | None = None) -> None:
+        """Look at everything, in one tab or in all."""
+        if self.layout is None:
+            return
+        view, start = self.layout.view, self._server.initial_camera
+        if client is None:
+            start.position, start.look_at = tuple(view.position), tuple(view.target)
+        for tab in [client] if client is not None else self._server.get_clients().values():
+            tab.camera.position, tab.camera.look_at = tuple(view.position), tuple(view.target)
+            tab.camera.up_direction = (0.0, 0.0, 1.0)
+
+    def mark(self, picked: Picked | None) -> None:
+        """Put a ball on the edge point that was clicked."""
+        self._remove("/picked")
+        if picked is not None:
+            at = self.shown[picked.pane][picked.edge]
+            self._nodes["/picked"] = self._server.scene.add_icosphere(
+                "/picked", radius=0.012, color=_MARK_COLOR, opacity=0.8, position=tuple(map(float, at))
+            )
+
+    def _draw_cloud(self, number: int, pane: Pane, place: Place, settings: Settings) -> None:
+        source = pane.source
+        assert source.cloud is not None
+        key = (id(source), settings.coloring, source.normals is not None)
+        if number not in self._colored or self._colored[number][0] != key:
+            self._colored[number] = key, cloud_colors(source, settings.coloring, place.rotation)
+        points, colors = source.cloud.xyz[source.shown], self._colored[number][1]
+        if settings.is_cropped:
+            inside = in_box(points, pane.box)
+            points, colors = points[inside], colors[inside]
+        self._points(f"/cloud{number}", place.to_scene(points), colors, self._size(pane, place, settings, _POINT, 0.0))
+
+    def _draw_edges(self, number: int, pane: Pane, place: Place, settings: Settings) -> np.ndarray:
+        """Draw the edge points and their segments; return where the points are."""
+        points, colors = np.empty((0, 3), np.float32), np.empty((0, 3), np.uint8)
+        edges = pane.edges
+        if edges is not None:
+            assert pane.source.cloud is not None
+            points = place.to_scene(pane.source.cloud.xyz[edges.index])
+            colors = edge_colors(edges, by_strength=settings.by_strength, least=LEAST_STRENGTH)
+        self._points(f"/edges{number}", points, colors, self._size(pane, place, settings, _EDGE, _LEAST_EDGE))
+        segments = {
+            "tangents": (settings.tangents, lambda: _tangents(edges, points, place)),
+            "normals": (settings.normals, lambda: _normals(edges, points, place)),
+        }
+        for name, (wanted, make) in segments.items():
+            self._segments(f"/{name}{number}", make if wanted and len(points) else None)
+        return points
+
+    def _size(self, pane: Pane, place: Place, settings: Settings, spacings: float, least: float) -> float:
+        drawn = pane.source.shown
+        # Where only a part is drawn the gaps are wider.
+        spread = 1.0 if not pane.source.is_thinned else np.sqrt(len(pane.source.cloud or ()) / len(drawn))
+        return settings.size * max(spacings * float(spread) * pane.source.spacing * place.unit, least, 1e-4)
+
+    def _points(self, name: str, points: np.ndarray, colors: np.ndarray, size: float) -> None:
+        node = self._nodes.get(name)
+        if len(points) == 0:
+            self._remove(name)
+        elif node is None:
+            self._nodes[name] = self._server.scene.add_point_cloud(
+                name, points, colors, point_size=size, point_shape="square", precision="float32", point_shading="flat"
+            )
+        else:  # what did not change is not sent again
+            node.points, node.colors, node.point_size = points, colors, size
+
+    def _segments(self, name: str, make: Callable[[], tuple[np.ndarray, np.ndarray]] | None) -> None:
+        self._remove(name)
+        if make is None:
+            return
+        ends, colors = make()
+        if len(ends):
+            self._nodes[name] = self._server.scene.add_line_segments(
+                name, ends, colors, thickness=2.0, thickness_units="screen"
+            )
+
+    def _remove(self, name: str) -> None:
+        node = self._nodes.pop(name, None)
+        if node is not None:
+            node.remove()
+
+    def _clear(self) -> None:
+        for name in list(self._nodes):
+            self._remove(name)
+        self._colored.clear()
+
+
+def _tangents(edges: Edges, points: np.ndarray, place: Place) -> tuple[np.ndarray, np.ndarray]:
+    """Segments along the edge, (S, 2, 3), and their colors, (S, 2, 3) uint8."""
+    rows = _spread(points)
+    along = edges.direction[rows] @ place.rotation.T
+    known = np.isfinite(along[:, 0])
+    middle, half = points[rows][known], _SEGMENT / 2 * along[known]
+    ends = np.stack([middle - half, middle + half], axis=1)
+    return ends, np.full((len(ends), 2, 3), _TANGENT_COLOR, np.uint8)
+
+
+def _normals(edges: Edges, points: np.ndarray, place: Place) -> tuple[np.ndarray, np.ndarray]:
+    """Segments along the normals of both faces, (S, 2, 3), and their colors, (S, 2, 3) uint8."""
+    rows = _spread(points)
+    ends, colors = [], []
+    for face, color in enumerate(_NORMAL_COLORS):
+        normals = edges.normals[rows, face] @ place.rotation.T
+        known = np.isfinite(normals[:, 0])
+        start = points[rows][known]
+        ends.append(np.stack([start, start + _SEGMENT * normals[known]], axis=1))
+        colors.append(np.full((len(start), 2, 3), color, np.uint8))
+    return np.concatenate(ends), np.concatenate(colors)
+
+
+def _spread(points: np.ndarray) -> np.ndarray:
+    """Rows of an even selection of the points: segments at all of them would be a carpet."""
+    return thin(points, _SEGMENT_CELL) if len(points) >= 3 else np.arange(len(points))
+
+
