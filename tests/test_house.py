@@ -27,7 +27,17 @@ LAYERS = [
     {"detect"},
 ]
 ONLY_CLOUD = {"io"}  # formats know the cloud (and the threads) and nothing else
-FREE = {"synth", "plot", "scene", "camera", "report", "demo", "cli", "figures"}  # on top: may use everything above
+FREE = {
+    "synth",
+    "plot",
+    "scene",
+    "camera",
+    "report",
+    "demo",
+    "cli",
+    "figures",
+    "view",
+}  # on top: may use everything above
 
 
 def _room(path: Path) -> str:
@@ -71,7 +81,7 @@ def test_modules_stay_small(path):
 
 
 def test_import_is_light():
-    heavy = ["matplotlib", "laspy", "typer", "rich", "PIL", "pye57"]
+    heavy = ["matplotlib", "laspy", "typer", "rich", "PIL", "pye57", "viser"]
     code = f"import sys, edgel; print(*(m for m in {heavy} if m in sys.modules))"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert loaded == []

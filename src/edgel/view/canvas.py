@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -20,9 +19,10 @@ from edgel.view.settings import Settings
 _POINT = 1.3  # size of a point of the cloud, in spacings: no holes, and little drawn twice
 _EDGE = 2.2  # the same of an edge point, drawn on top of its neighbours
 _LEAST_EDGE = 0.007  # scene units: two pixels or three on a usual screen
-_SEGMENT = 0.05  # length of a segment, scene units
-_SEGMENT_CELL = 0.025  # at most one segment a cell of this size, scene units
-_TANGENT_COLOR, _NORMAL_COLORS = (0, 110, 40), ((20, 20, 20), (150, 95, 20))
+_NORMAL, _TANGENT = 0.06, 0.05  # lengths of segments, scene units
+_LIFT = 0.012  # scene units from the surface to the tangents, which the edge points would hide
+_CELL = 0.03  # at most one segment a cell of this size, scene units
+_TANGENT_COLOR, _NORMAL_COLORS = (0, 150, 50), ((40, 40, 40), (190, 120, 20))
 _MARK_COLOR = (255, 220, 0)
 
 
@@ -32,7 +32,7 @@ class Canvas:
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
         self._nodes: dict[str, Any] = {}
-        self._colored: dict[int, tuple[Any, np.ndarray]] = {}
+        self._drawn: dict[str, Any] = {}
         self._laid_out: list[int] = []
         self.layout: Layout | None = None
         self.shown: list[np.ndarray] = []
@@ -76,38 +76,38 @@ class Canvas:
             )
 
     def _draw_cloud(self, number: int, pane: Pane, place: Place, settings: Settings) -> None:
-        source = pane.source
-        assert source.cloud is not None
-        key = (id(source), settings.coloring, source.normals is not None)
-        if number not in self._colored or self._colored[number][0] != key:
-            self._colored[number] = key, cloud_colors(source, settings.coloring, place.rotation)
-        points, colors = source.cloud.xyz[source.shown], self._colored[number][1]
+        source, name = pane.source, f"/cloud{number}"
+        key = (settings.coloring, settings.crop, settings.size, source.normals is not None)
+        if self._drawn.get(name) == key:  # nearly always, and comparing millions of points would take its time
+            return
+        self._drawn[name] = key
+        points, colors = pane.cloud.xyz[source.shown], cloud_colors(source, settings.coloring, place.rotation)
         if settings.is_cropped:
             inside = in_box(points, pane.box)
             points, colors = points[inside], colors[inside]
-        self._points(f"/cloud{number}", place.to_scene(points), colors, self._size(pane, place, settings, _POINT, 0.0))
+        self._points(name, place.to_scene(points), colors, self._size(pane, place, settings, _POINT, 0.0))
 
     def _draw_edges(self, number: int, pane: Pane, place: Place, settings: Settings) -> np.ndarray:
         """Draw the edge points and their segments; return where the points are."""
-        points, colors = np.empty((0, 3), np.float32), np.empty((0, 3), np.uint8)
+        points, colors, segments = np.empty((0, 3), np.float32), np.empty((0, 3), np.uint8), {}
         edges = pane.edges
-        if edges is not None:
-            assert pane.source.cloud is not None
-            points = place.to_scene(pane.source.cloud.xyz[edges.index])
+        if edges is not None and len(edges):
+            points = place.to_scene(pane.cloud.xyz[edges.index])
             colors = edge_colors(edges, by_strength=settings.by_strength, least=LEAST_STRENGTH)
+            rows = _spread(points) if settings.tangents or settings.normals else np.empty(0, np.int64)
+            if settings.tangents:
+                segments["tangents"] = _tangents(edges.take(rows), points[rows], place)
+            if settings.normals:
+                segments["normals"] = _normals(edges.take(rows), points[rows], place)
         self._points(f"/edges{number}", points, colors, self._size(pane, place, settings, _EDGE, _LEAST_EDGE))
-        segments = {
-            "tangents": (settings.tangents, lambda: _tangents(edges, points, place)),
-            "normals": (settings.normals, lambda: _normals(edges, points, place)),
-        }
-        for name, (wanted, make) in segments.items():
-            self._segments(f"/{name}{number}", make if wanted and len(points) else None)
+        for name in ("tangents", "normals"):
+            self._segments(f"/{name}{number}", segments.get(name))
         return points
 
     def _size(self, pane: Pane, place: Place, settings: Settings, spacings: float, least: float) -> float:
         drawn = pane.source.shown
         # Where only a part is drawn the gaps are wider.
-        spread = 1.0 if not pane.source.is_thinned else np.sqrt(len(pane.source.cloud or ()) / len(drawn))
+        spread = 1.0 if not pane.source.is_thinned else np.sqrt(len(pane.cloud) / len(drawn))
         return settings.size * max(spacings * float(spread) * pane.source.spacing * place.unit, least, 1e-4)
 
     def _points(self, name: str, points: np.ndarray, colors: np.ndarray, size: float) -> None:
@@ -121,14 +121,11 @@ class Canvas:
         else:  # what did not change is not sent again
             node.points, node.colors, node.point_size = points, colors, size
 
-    def _segments(self, name: str, make: Callable[[], tuple[np.ndarray, np.ndarray]] | None) -> None:
+    def _segments(self, name: str, segments: tuple[np.ndarray, np.ndarray] | None) -> None:
         self._remove(name)
-        if make is None:
-            return
-        ends, colors = make()
-        if len(ends):
+        if segments is not None and len(segments[0]):
             self._nodes[name] = self._server.scene.add_line_segments(
-                name, ends, colors, thickness=2.0, thickness_units="screen"
+                name, *segments, thickness=2.0, thickness_units="screen"
             )
 
     def _remove(self, name: str) -> None:
@@ -139,34 +136,31 @@ class Canvas:
     def _clear(self) -> None:
         for name in list(self._nodes):
             self._remove(name)
-        self._colored.clear()
+        self._drawn.clear()
 
 
 def _tangents(edges: Edges, points: np.ndarray, place: Place) -> tuple[np.ndarray, np.ndarray]:
     """Segments along the edge, (S, 2, 3), and their colors, (S, 2, 3) uint8."""
-    rows = _spread(points)
-    along = edges.direction[rows] @ place.rotation.T
+    along, normals = edges.direction @ place.rotation.T, edges.normals[:, 0] @ place.rotation.T
     known = np.isfinite(along[:, 0])
-    middle, half = points[rows][known], _SEGMENT / 2 * along[known]
+    middle = (points + _LIFT * np.nan_to_num(normals))[known]
+    half = _TANGENT / 2 * along[known]
     ends = np.stack([middle - half, middle + half], axis=1)
     return ends, np.full((len(ends), 2, 3), _TANGENT_COLOR, np.uint8)
 
 
 def _normals(edges: Edges, points: np.ndarray, place: Place) -> tuple[np.ndarray, np.ndarray]:
     """Segments along the normals of both faces, (S, 2, 3), and their colors, (S, 2, 3) uint8."""
-    rows = _spread(points)
     ends, colors = [], []
     for face, color in enumerate(_NORMAL_COLORS):
-        normals = edges.normals[rows, face] @ place.rotation.T
+        normals = edges.normals[:, face] @ place.rotation.T
         known = np.isfinite(normals[:, 0])
-        start = points[rows][known]
-        ends.append(np.stack([start, start + _SEGMENT * normals[known]], axis=1))
+        start = points[known]
+        ends.append(np.stack([start, start + _NORMAL * normals[known]], axis=1))
         colors.append(np.full((len(start), 2, 3), color, np.uint8))
     return np.concatenate(ends), np.concatenate(colors)
 
 
 def _spread(points: np.ndarray) -> np.ndarray:
     """Rows of an even selection of the points: segments at all of them would be a carpet."""
-    return thin(points, _SEGMENT_CELL) if len(points) >= 3 else np.arange(len(points))
-
-
+    return thin(points, _CELL) if len(points) >= 3 else np.arange(len(points))

@@ -100,7 +100,9 @@ def edge_colors(edges: Edges, *, by_strength: bool, least: float) -> np.ndarray:
 def _intensity(source: Source) -> np.ndarray | None:
     """Intensity of the points drawn, 0 to 1, None where the file has none."""
     assert source.cloud is not None
-    attributes = {name: v for name, v in source.cloud.attributes.items() if name.lower() not in ("red", "green", "blue")}
+    attributes = {
+        name: v for name, v in source.cloud.attributes.items() if name.lower() not in ("red", "green", "blue")
+    }
     channels = color_channels(replace(source.cloud, attributes=attributes))
     return None if channels is None else channels[source.shown, 0]
 

@@ -15,7 +15,7 @@ import numpy as np
 from edgel.view.source import Source, reach
 
 FIELD_OF_VIEW = 0.7  # of the page's camera, vertical, radians
-_ASPECT = 1.2  # width of the picture by its height, about, beside the panel
+_ASPECT = 1.0  # width of the picture by its height, about, beside the panel
 _GAP = 0.15  # between neighbours, scene units
 _LEVEL = np.array([0.0, 1.0, 0.0])
 _OBLIQUE = np.array([-0.45, 0.65, -0.62]) / np.linalg.norm([-0.45, 0.65, -0.62])
@@ -80,7 +80,7 @@ class Layout:
 
 
 def lay_out(sources: Sequence[Source]) -> Layout:
-    """Place clouds (already read, one as often as it is shown) in a row, from left to right as seen in the first view."""
+    """Place clouds, already read, in a row from left to right as seen in the first view."""
     turned = [_turned(source) for source in sources]
     sizes = [float(half.max()) or 1.0 for _, _, half in turned]
     same_scale = max(sizes) <= _SAME_SCALE * min(sizes)
@@ -115,5 +115,5 @@ def _fit(places: list[Place], away: np.ndarray, right: np.ndarray) -> View:
     corners = corners - target
     reach_up = np.tan(FIELD_OF_VIEW / 2)
     need = np.maximum(np.abs(corners @ right) / (reach_up * _ASPECT), np.abs(corners @ up) / reach_up)
-    distance = 1.05 * float((need - corners @ away).max())
+    distance = 1.1 * float((need - corners @ away).max())
     return View(target - distance * away, target)

@@ -29,9 +29,7 @@ class Picked:
     edge: int
 
 
-def pick(
-    shown: Sequence[np.ndarray], origin: np.ndarray, direction: np.ndarray, *, max_angle: float
-) -> Picked | None:
+def pick(shown: Sequence[np.ndarray], origin: np.ndarray, direction: np.ndarray, *, max_angle: float) -> Picked | None:
     """Find the edge point that a click meant.
 
     Parameters
@@ -70,7 +68,7 @@ def pick(
 
 def describe(pane: Pane, edge: int) -> dict[str, str]:
     """Put into words what is known of an edge point of a pane, by its place among those shown."""
-    assert pane.edges is not None and pane.source.cloud is not None
+    assert pane.edges is not None
     edges = pane.edges
     row = int(edges.index[edge])
     bend = {1: "convex, like the edge of a cube", -1: "concave, like the edge of a hole"}
@@ -81,7 +79,7 @@ def describe(pane: Pane, edge: int) -> dict[str, str]:
         "strength": f"{edges.strength[edge]:.3f}",
         "angle": _degrees(edges.angle[edge]),
         "bend": bend.get(int(edges.convex[edge]), "unknown"),
-        "point": _vector(pane.source.cloud.xyz[row]),
+        "point": _vector(pane.cloud.xyz[row]),
         "place on the edge": _vector(edges.position[edge]),
         "tangent": _vector(edges.direction[edge], 3),
         "normal": _vector(edges.normals[edge, 0], 3),

@@ -43,6 +43,8 @@ class Pane:
     ----------
     source : Source
         Already read.
+    cloud : Cloud
+        Its cloud.
     preset : str
     run : Run or None
         The run whose edges are shown; None before the first is done.
@@ -57,6 +59,7 @@ class Pane:
     """
 
     source: Source
+    cloud: Cloud
     preset: str
     run: Run | None
     answer: Answer | None
@@ -82,8 +85,6 @@ class Session:
     paths : sequence of paths
     intrinsics : path, optional
         The camera of depth images.
-    changed : callable
-        Called, from the worker, whenever there is something new to show.
     detect : callable
         As `edgel.view.scale.detect_at_scale`.
     read : callable
@@ -95,14 +96,16 @@ class Session:
         paths: Sequence[str | os.PathLike[str]],
         *,
         intrinsics: str | os.PathLike[str] | None = None,
-        changed: Callable[[], None] = lambda: None,
         detect: Callable[..., Edges] = detect_at_scale,
         read: Callable[..., Cloud] = edgel.read,
     ) -> None:
         self.sources = [Source(path, intrinsics=intrinsics, read=read) for path in paths]
+        for source in self.sources:
+            if [other.name for other in self.sources].count(source.name) > 1:
+                source.name = source.path
         self.doing = ""
         self._settings = Settings()
-        self._changed = changed
+        self._changed: Callable[[], None] = lambda: None
         self._detect = detect
         self._answers: dict[Run, Answer] = {}
         self._last: dict[tuple[int, str], Run] = {}
@@ -119,8 +122,9 @@ class Session:
         self._settings = settings
         self._worker.wake()
 
-    def start(self) -> None:
-        """Begin to read the files."""
+    def start(self, changed: Callable[[], None] = lambda: None) -> None:
+        """Begin to read the files; `changed` is called, from the worker, whenever there is something new to show."""
+        self._changed = changed
         self._worker.wake()
 
     def close(self) -> None:
@@ -152,7 +156,7 @@ class Session:
         edges = None
         if answer is not None and answer.edges is not None:
             edges = select(answer.edges, source.cloud.xyz, settings, box)
-        return Pane(source, preset, run, answer, edges, box, run == wanted)
+        return Pane(source, source.cloud, preset, run, answer, edges, box, run == wanted)
 
     def _wanted_run(self, number: int, preset: str, settings: Settings) -> Run:
         return settings.run(number, preset, has_color=self.sources[number].has_color)
