@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Annotated
 
 import typer
@@ -9,7 +10,6 @@ import typer
 from edgel.cli import options
 from edgel.cli.errors import ExitCode, Failure, exit_codes
 from edgel.cli.output import print_line
-from edgel.io.errors import describe_error
 
 HELP = """Look at clouds and their edges in the browser, and try what decides about them.
 
@@ -64,7 +64,8 @@ def view(
         except OSError as error:
             where = f"{host}:{port}" if port else host
             remedy = "choose another --port, or leave it out" if port else "choose another --host, or leave it out"
-            raise Failure(ExitCode.USAGE, f"cannot listen at {where} ({describe_error(error)}); {remedy}") from error
+            what = os.strerror(error.errno).lower() if error.errno else str(error)
+            raise Failure(ExitCode.USAGE, f"cannot listen at {where} ({what}); {remedy}") from error
 
 
 def _tell(url: str) -> None:

@@ -53,6 +53,8 @@ class Canvas:
             for number, (pane, place) in enumerate(zip(panes, self.layout.places, strict=True)):
                 self._draw_cloud(number, pane, place, settings)
                 shown.append(self._draw_edges(number, pane, place, settings))
+                if len(panes) > 1:
+                    self._label(f"/label{number}", pane.name, place)
         self.shown = shown
 
     def look(self, client: viser.ClientHandle | None = None) -> None:
@@ -72,7 +74,7 @@ class Canvas:
         if picked is not None:
             at = self.shown[picked.pane][picked.edge]
             self._nodes["/picked"] = self._server.scene.add_icosphere(
-                "/picked", radius=0.012, color=_MARK_COLOR, opacity=0.8, position=tuple(map(float, at))
+                "/picked", radius=0.012, color=_MARK_COLOR, opacity=0.8, position=at.astype(float)
             )
 
     def _draw_cloud(self, number: int, pane: Pane, place: Place, settings: Settings) -> None:
@@ -127,6 +129,11 @@ class Canvas:
             self._nodes[name] = self._server.scene.add_line_segments(
                 name, *segments, thickness=2.0, thickness_units="screen"
             )
+
+    def _label(self, name: str, text: str, place: Place) -> None:
+        if name not in self._nodes:
+            above = place.offset + [0.0, 0.0, place.half[2] + 0.1]
+            self._nodes[name] = self._server.scene.add_label(name, text, position=above)
 
     def _remove(self, name: str) -> None:
         node = self._nodes.pop(name, None)

@@ -51,9 +51,9 @@ class Latest:
             self._changed.notify_all()
 
     def wait_idle(self, timeout: float | None = None) -> bool:
-        """Wait until nothing is wanted any more, and say whether that came to pass within `timeout` seconds."""
+        """Wait until nothing is left to do, and say whether that came to pass within `timeout` seconds."""
         with self._changed:
-            return self._changed.wait_for(lambda: not (self._wanted or self._busy), timeout)
+            return self._changed.wait_for(lambda: not self._busy and (self._closed or not self._wanted), timeout)
 
     def _run(self) -> None:
         while True:

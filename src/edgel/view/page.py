@@ -49,8 +49,9 @@ class Page:
         session.start(self._painter.wake)
 
     def close(self) -> None:
-        """Draw no more."""
+        """Draw no more, and let a drawing under way come to its end, so that viser may stop."""
         self._painter.close()
+        self._painter.wait_idle(2.0)
 
     def _take_over(self) -> None:
         with self._lock:  # read and assigned at once, or an older reading could come last

@@ -15,6 +15,7 @@ from edgel.view.settings import Settings
 _BOX = "font-size:0.85em;line-height:1.4;padding:0.1em 0.8em 0.4em 0.8em;overflow-wrap:anywhere"
 _ALARM = "color:#a00;background:#fff0f0;border-left:3px solid #c00;padding:0.3em 0.6em;margin:0.3em 0"
 _NOTE = "color:#666"
+_NUMBER = "text-align:right;padding-left:0.8em"
 _PRE = "margin:0;padding:0.4em;background:#f4f4f4;white-space:pre-wrap;font-size:0.9em"
 _COPY = (
     "const b=this,p=b.nextElementSibling;getSelection().selectAllChildren(p);document.execCommand('copy');"
@@ -49,10 +50,13 @@ def legend(panes: Sequence[Pane], settings: Settings) -> str:
         bar = f"<div style='height:0.8em;background:linear-gradient(to right, {stops})'></div>"
         return f"<div style='{_BOX}'>{bar}<span>weak</span><span style='float:right'>strong</span></div>"
     rows = []
+    if len(found) > 1:
+        names = "".join(f"<td style='{_NUMBER};{_NOTE}'>{escape(pane.name)}</td>" for pane in found)
+        rows.append(f"<tr><td></td><td></td>{names}</tr>")
     for kind, color in KIND_COLORS.items():
         counts = [_count(pane, kind) for pane in found]
         if any(counts):
-            cells = "".join(f"<td style='text-align:right;padding-left:0.8em'>{number:,}</td>" for number in counts)
+            cells = "".join(f"<td style='{_NUMBER}'>{number:,}</td>" for number in counts)
             meaning = f"<span style='{_NOTE}'>{KIND_MEANINGS[kind]}</span>"
             rows.append(
                 f"<tr><td style='color:{_css(color)};font-size:1.3em'>&#9632;</td>"
