@@ -19,7 +19,7 @@ from edgel.view import source as source_module
 from edgel.view.colors import KIND_COLORS, cloud_colors, colorings, edge_colors
 from edgel.view.commands import command_line, python_lines
 from edgel.view.latest import Latest
-from edgel.view.layout import lay_out
+from edgel.view.layout import FIELD_OF_VIEW, lay_out
 from edgel.view.pick import Picked, describe, pick
 from edgel.view.save import edges_file, picture_file
 from edgel.view.select import select
@@ -166,11 +166,11 @@ def test_going_back_is_remembered(open_session, hall_file):
 
 
 def test_more_files_than_answers_kept(open_session, hall_file):
-    session = open_session([hall_file] * 30, detect=SlowDetector(edgel.detect(hall())))
+    session = open_session([hall_file] * 15, detect=SlowDetector(edgel.detect(hall())))
     session.settings = Settings(method="side by side")
     assert session.wait_idle(TIMEOUT)
     assert all(pane.is_current and pane.edges is not None for pane in session.panes())
-    assert len(session.panes()) == 60
+    assert len(session.panes()) == 30
 
 
 def test_old_edges_stay_until_the_new_ones_are_there(open_session, hall_file):
@@ -425,7 +425,7 @@ def test_median_spacing_does_not_count_repeats():
         Settings(method="paper"),
         Settings(method="paper", scale=2.0, crop=((0.0, 1.0), (0.3, 0.9), (0.0, 1.0))),
     ],
-    ids=str,
+    ids=["default", "strength", "kinds", "angle and scale", "crop", "paper", "paper cropped at a scale"],
 )
 def test_python_lines_find_what_is_seen(open_session, hall_file, settings, tmp_path, monkeypatch):
     session = open_session([hall_file])
@@ -441,7 +441,11 @@ def test_python_lines_find_what_is_seen(open_session, hall_file, settings, tmp_p
     assert list(tmp_path.glob("*edges.ply"))
 
 
-@pytest.mark.parametrize("settings", [Settings(), Settings(kinds=EdgeKind.CREASE), Settings(method="paper")], ids=str)
+@pytest.mark.parametrize(
+    "settings",
+    [Settings(), Settings(strength=0.8), Settings(kinds=EdgeKind.CREASE), Settings(method="paper")],
+    ids=["default", "strength", "kinds", "paper"],
+)
 def test_command_line_finds_what_is_seen(open_session, hall_file, settings, tmp_path, monkeypatch):
     session = open_session([hall_file])
     session.settings = settings
@@ -524,16 +528,21 @@ def test_clouds_stand_side_by_side(open_session, hall_file, tmp_path):
     layout = lay_out([pane.source for pane in panes])
     assert not layout.same_scale
     boxes = []
-    away = layout.view.target - layout.view.position
-    right = np.cross(away, [0.0, 0.0, 1.0])
     for pane, place in zip(panes, layout.places, strict=True):
         shown = place.to_scene(pane.cloud.xyz)
         assert shown.dtype == np.float32
         assert np.abs(shown).max() < 5
-        boxes.append(shown @ right / np.linalg.norm(right))
+        boxes.append(shown @ layout.right)
         direction = np.array([0.3, 0.4, 0.5])
         np.testing.assert_allclose(place.rotation @ place.to_cloud(direction), direction)
     assert boxes[0].max() < boxes[1].min()
+    for aspect in (0.5, 2.0):
+        view = layout.view(aspect)
+        for pane, place in zip(panes, layout.places, strict=True):
+            seen = place.to_scene(pane.cloud.xyz) - view.position
+            depth = seen @ layout.away
+            assert (np.abs(seen @ layout.right) < np.tan(FIELD_OF_VIEW / 2) * aspect * depth).all()
+            assert (np.abs(seen @ np.cross(layout.right, layout.away)) < np.tan(FIELD_OF_VIEW / 2) * depth).all()
 
 
 def test_colors_are_offered_where_the_file_has_them(open_session, tmp_path):

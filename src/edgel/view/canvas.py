@@ -61,12 +61,10 @@ class Canvas:
         """Look at everything, in one tab or in all."""
         if self.layout is None:
             return
-        view, start = self.layout.view, self._server.initial_camera
-        if client is None:
-            start.position, start.look_at = tuple(view.position), tuple(view.target)
         for tab in [client] if client is not None else self._server.get_clients().values():
-            tab.camera.position, tab.camera.look_at = tuple(view.position), tuple(view.target)
+            view = self.layout.view(tab.camera.aspect)
             tab.camera.up_direction = (0.0, 0.0, 1.0)
+            tab.camera.position, tab.camera.look_at = view.position, view.target
 
     def mark(self, picked: Picked | None) -> None:
         """Put a ball on the edge point that was clicked."""

@@ -15,7 +15,7 @@ import numpy as np
 from edgel.view.source import Source, reach
 
 FIELD_OF_VIEW = 0.7  # of the page's camera, vertical, radians
-_ASPECT = 1.0  # width of the picture by its height, about, beside the panel
+_MARGIN = 1.05  # of the distance to the target
 _GAP = 0.15  # between neighbours, scene units
 _LEVEL = np.array([0.0, 1.0, 0.0])
 _OBLIQUE = np.array([-0.45, 0.65, -0.62]) / np.linalg.norm([-0.45, 0.65, -0.62])
@@ -64,19 +64,30 @@ class View:
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """Places of the panes, in their order, and the view that shows them all.
+    """Places of the panes, in their order, and how they are first looked at.
 
     Attributes
     ----------
     places : list of Place
-    view : View
+    away, right : (3,) float64
+        Where the first view looks, and what is to its right.
     same_scale : bool
         Whether all clouds are drawn to the same scale.
     """
 
     places: list[Place]
-    view: View
+    away: np.ndarray
+    right: np.ndarray
     same_scale: bool
+
+    def view(self, aspect: float) -> View:
+        """Step back until the corners of all boxes are in a picture of this width by height."""
+        signs = np.array(list(product((-1.0, 1.0), repeat=3)))
+        corners = np.concatenate([place.offset + signs * place.half for place in self.places])
+        target = (corners.min(axis=0) + corners.max(axis=0)) / 2
+        corners, up, reach_up = corners - target, np.cross(self.right, self.away), np.tan(FIELD_OF_VIEW / 2)
+        need = np.maximum(np.abs(corners @ self.right) / (reach_up * aspect), np.abs(corners @ up) / reach_up)
+        return View(target - _MARGIN * float((need - corners @ self.away).max()) * self.away, target)
 
 
 def lay_out(sources: Sequence[Source]) -> Layout:
@@ -94,7 +105,7 @@ def lay_out(sources: Sequence[Source]) -> Layout:
     for (rotation, centre, half), unit, width in zip(turned, units, widths, strict=True):
         places.append(Place(rotation, centre, unit, (left + width / 2) * right, half * unit))
         left += width + _GAP
-    return Layout(places, _fit(places, away, right), same_scale)
+    return Layout(places, away, right, same_scale)
 
 
 def _turned(source: Source) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -104,16 +115,3 @@ def _turned(source: Source) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     assert source.cloud is not None
     low, high = reach(source.cloud.xyz[source.shown] @ rotation.T)
     return rotation, (low + high) / 2 @ rotation, (high - low) / 2
-
-
-def _fit(places: list[Place], away: np.ndarray, right: np.ndarray) -> View:
-    """Step back along a direction until the corners of all boxes are in the picture."""
-    signs = np.array(list(product((-1.0, 1.0), repeat=3)))
-    corners = np.concatenate([place.offset + signs * place.half for place in places])
-    target = (corners.min(axis=0) + corners.max(axis=0)) / 2
-    up = np.cross(right, away)
-    corners = corners - target
-    reach_up = np.tan(FIELD_OF_VIEW / 2)
-    need = np.maximum(np.abs(corners @ right) / (reach_up * _ASPECT), np.abs(corners @ up) / reach_up)
-    distance = 1.1 * float((need - corners @ away).max())
-    return View(target - distance * away, target)

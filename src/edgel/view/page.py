@@ -46,6 +46,7 @@ class Page:
         self._controls.save_edges.on_click(self._save_edges)
         self._controls.save_picture.on_click(self._save_picture)
         server.scene.on_click()(self._click)
+        server.on_client_connect(self._canvas.look)
         session.start(self._painter.wake)
 
     def close(self) -> None:
