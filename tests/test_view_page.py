@@ -58,7 +58,7 @@ def served(folder, tee):
 
     damaged = folder / "<b>damaged.ply"
     damaged.write_bytes(tee.read_bytes()[:5000])
-    with running([str(tee), str(damaged)]) as (server, session):
+    with running([str(tee), str(damaged)]) as (server, session, _):
         yield f"http://127.0.0.1:{server.get_port()}", session
 
 
@@ -99,7 +99,7 @@ def test_slider_on_a_large_cloud(browser, folder, errors):
 
     path = folder / "large.ply"
     edgel.write(path, synth.scan(synth.tee()).cloud)
-    with running([str(path)]) as (server, session):
+    with running([str(path)]) as (server, session, _):
         page = open_tab(browser, f"http://127.0.0.1:{server.get_port()}", errors)
         assert "647,984 points" in page.locator(".edgel-status").inner_text()
         answer = session.panes()[0].answer.edges
@@ -168,10 +168,12 @@ def test_published_method_beside_with_its_images(page, served):
 def test_crop_and_colors(page):
     before = shown(page)
     page.get_by_text("Crop", exact=True).click()
-    thumb = page.locator("xpath=//label[text()='x (%)']/following::*[@role='slider'][2]")
-    thumb.focus()
-    for _ in range(30):
-        page.keyboard.press("ArrowLeft")
+    thumb = page.locator("xpath=//label[text()='x (%)']/following::*[contains(@class, 'multi-slider-thumb')][2]")
+    thumb.hover()
+    box = thumb.bounding_box()
+    page.mouse.down()
+    page.mouse.move(box["x"] - 80, box["y"] + box["height"] / 2, steps=5)
+    page.mouse.up()
     wait_for(lambda: shown(page) < before, "fewer edges")
     assert "in_box" in page.locator(".edgel-code").inner_text()
     page.get_by_role("button", name="Whole cloud").click()

@@ -23,6 +23,7 @@ _NORMAL, _TANGENT = 0.06, 0.05  # lengths of segments, scene units
 _LIFT = 0.012  # scene units from the surface to the tangents, which the edge points would hide
 _CELL = 0.03  # at most one segment a cell of this size, scene units
 _TANGENT_COLOR, _NORMAL_COLORS = (0, 150, 50), ((40, 40, 40), (190, 120, 20))
+_ABOVE = 0.12  # scene units from a cloud to its name
 _MARK_COLOR = (255, 220, 0)
 
 
@@ -130,7 +131,9 @@ class Canvas:
 
     def _label(self, name: str, text: str, place: Place) -> None:
         if name not in self._nodes:
-            above = place.offset + [0.0, 0.0, place.half[2] + 0.1]
+            assert self.layout is not None
+            up = np.cross(self.layout.right, self.layout.away)
+            above = place.offset + (np.abs(up) @ place.half + _ABOVE) * up
             self._nodes[name] = self._server.scene.add_label(name, text, position=above)
 
     def _remove(self, name: str) -> None:

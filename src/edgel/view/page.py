@@ -47,7 +47,15 @@ class Page:
         self._controls.save_picture.on_click(self._save_picture)
         server.scene.on_click()(self._click)
         server.on_client_connect(self._canvas.look)
-        session.start(self._painter.wake)
+        session.start(self.refresh)
+
+    def refresh(self) -> None:
+        """Draw anew, soon."""
+        self._painter.wake()
+
+    def wait_idle(self, timeout: float | None = None) -> bool:
+        """Wait until all is drawn, at most `timeout` seconds, and say whether it is."""
+        return self._painter.wait_idle(timeout)
 
     def close(self) -> None:
         """Draw no more, and let a drawing under way come to its end, so that viser may stop."""

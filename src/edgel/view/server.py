@@ -55,7 +55,7 @@ def serve(
     OSError
         If nothing can listen at that address.
     """
-    with running(paths, host=host, port=port, intrinsics=intrinsics) as (server, _):
+    with running(paths, host=host, port=port, intrinsics=intrinsics) as (server, _, _):
         shown = "localhost" if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
         url = f"http://{shown}:{server.get_port()}"
         ready(url)
@@ -68,13 +68,13 @@ def serve(
 @contextmanager
 def running(
     paths: Sequence[str], *, host: str = LOCAL[0], port: int | None = None, intrinsics: str | None = None
-) -> Iterator[tuple[viser.ViserServer, Session]]:
+) -> Iterator[tuple[viser.ViserServer, Session, Page]]:
     """Serve the page for as long as the ``with`` lasts; as `serve`, which waits for Ctrl-C."""
     session = Session(paths, intrinsics=intrinsics)
     server = _listen(host, _free_port(host, port))
     page = Page(server, session)
     try:
-        yield server, session
+        yield server, session, page
     finally:
         session.close()
         page.close()
