@@ -6,9 +6,11 @@ test does.
 
 from __future__ import annotations
 
+import io
 import sys
 import tempfile
 from collections.abc import Callable
+from contextlib import chdir
 from pathlib import Path
 from typing import Any
 
@@ -22,15 +24,13 @@ from edgel.view.server import running
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from browser import choose, chromium, input_of, picture, type_number
 
-DOCS = Path(__file__).parent.parent / "docs" / "view"
+DOCS = Path(__file__).resolve().parent.parent / "docs" / "view"
 SIZE = {"width": 1280, "height": 800}
 PATIENCE = 180_000  # ms: without a GPU, and beside other work, a frame of a large cloud may take seconds
 
 
-def shoot(
-    browser: Any, name: str, files: list[Path], act: Callable[[Any, Any], None] = lambda page, session: None
-) -> None:
-    with running([str(file) for file in files]) as (server, session, _):
+def shoot(browser: Any, name: str, folder: Path, files: list[str], act: Callable[[Any, Any], None]) -> None:
+    with chdir(folder), running(files) as (server, session, _):  # so that the page shows the names alone
         session.wait_idle(PATIENCE / 1000)  # before the browser takes what power there is
         page = browser.new_page(viewport=SIZE)
         page.set_default_timeout(PATIENCE)
@@ -43,12 +43,11 @@ def shoot(
         session.wait_idle(PATIENCE / 1000)
         settle(page)
         page.mouse.move(SIZE["width"] - 20, SIZE["height"] - 10)
-        path = DOCS / f"{name}.png"
-        page.screenshot(path=path)
-        # 256 colors, and a third of the size.
-        Image.open(path).convert("RGB").quantize(256, dither=Image.Dither.NONE).save(path, optimize=True)
+        picture_of_page = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
         page.close()
-    print(path)
+    # 256 colors, and a third of the size.
+    picture_of_page.quantize(256, dither=Image.Dither.NONE).save(DOCS / f"{name}.png", optimize=True)
+    print(DOCS / f"{name}.png", flush=True)
 
 
 def settle(page: Any) -> None:
@@ -68,7 +67,7 @@ def click_edge(page: Any, _session: Any) -> None:
     seen = picture(page)
     edge = (seen.max(axis=2) - seen.min(axis=2)) > 120
     rows, columns = np.nonzero(edge)
-    middle = np.argmin(np.hypot(rows - seen.shape[0] * 0.5, columns - seen.shape[1] * 0.5))
+    middle = np.argmin(np.hypot(rows - seen.shape[0] * 0.3, columns - seen.shape[1] * 0.7))
     page.locator("canvas").last.click(position={"x": int(columns[middle]), "y": int(rows[middle])})
     page.locator(".edgel-point").wait_for()
     page.get_by_text("Clicked point").scroll_into_view_if_needed()
@@ -100,21 +99,19 @@ def at_scale(page: Any, session: Any) -> None:
 
 
 def main() -> None:
-    data = Path(sys.argv[1]) if len(sys.argv) > 1 else Path("../shared/data")
+    data = Path(sys.argv[1] if len(sys.argv) > 1 else "../shared/data").resolve()
     DOCS.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory() as folder, chromium() as browser:
-        tee = Path(folder) / "tee.ply"
-        edgel.write(tee, synth.scan(synth.tee(), num_points=200_000).cloud)
-        part = data / "truth" / "abc_7010.ply"
+    with tempfile.TemporaryDirectory() as made, chromium() as browser:
+        edgel.write(Path(made) / "tee.ply", synth.scan(synth.tee(), num_points=200_000).cloud)
         pictures = {
-            "tee": ([tee], nothing),
-            "tee-side-by-side": ([tee], side_by_side),
-            "depth-frame": ([data / "kinect_objects" / "learn0.pcd"], nothing),
-            "lidar-sweep": ([data / "lidar_sweeps" / "small_gicp_target.ply"], at_scale),
-            "airborne": ([data / "airborne" / "autzen_trim.laz"], by_height),
-            "part": ([part], segments),
-            "clicked": ([part], click_edge),
-            "two-files": ([part, data / "truth" / "abc_7029.ply", Path("gone.ply")], nothing),
+            "tee": (Path(made), ["tee.ply"], nothing),
+            "tee-side-by-side": (Path(made), ["tee.ply"], side_by_side),
+            "depth-frame": (data / "kinect_objects", ["learn0.pcd"], nothing),
+            "lidar-sweep": (data / "lidar_sweeps", ["small_gicp_target.ply"], at_scale),
+            "airborne": (data / "airborne", ["autzen_trim.laz"], by_height),
+            "part": (data / "truth", ["abc_7010.ply"], segments),
+            "clicked": (data / "truth", ["abc_7010.ply"], click_edge),
+            "two-files": (data / "truth", ["abc_7010.ply", "abc_7029.ply", "gone.ply"], nothing),
         }
         for name in sys.argv[2:] or pictures:
             shoot(browser, name, *pictures[name])

@@ -32,7 +32,13 @@ def wait_for(condition, what):
 
 def shown(page):
     """The number of edge points that the page says it shows."""
-    return int(re.search(r"([\d,]+) edge points shown", page.locator(".edgel-status").inner_text())[1].replace(",", ""))
+    return number_in(page.locator(".edgel-status").inner_text(), r"([\d,]+) edge points shown")
+
+
+def number_in(text, pattern):
+    found = re.search(pattern, text)
+    assert found is not None, text
+    return int(found[1].replace(",", ""))
 
 
 def count_pixels(page, kind):
@@ -102,11 +108,14 @@ def test_slider_on_a_large_cloud(browser, folder, errors):
     with running([str(path)]) as (server, session, _):
         page = open_tab(browser, f"http://127.0.0.1:{server.get_port()}", errors)
         assert "647,984 points" in page.locator(".edgel-status").inner_text()
-        answer = session.panes()[0].answer.edges
-        assert shown(page) == (answer.strength >= 0.5).sum()
+        answer = session.panes()[0].answer
+        assert answer is not None
+        assert answer.edges is not None
+        strength = answer.edges.strength
+        assert shown(page) == (strength >= 0.5).sum()
         before = picture(page)
         type_number(page, "Strength ≥", 0.9)
-        wait_for(lambda: shown(page) == (answer.strength >= 0.9).sum(), "fewer edges")
+        wait_for(lambda: shown(page) == (strength >= 0.9).sum(), "fewer edges")
         wait_for(lambda: (picture(page) != before).any(axis=2).sum() > 50, "another picture")
         page.close()
 
@@ -150,7 +159,7 @@ def test_click_shows_the_numbers(page):
     rows, columns = np.nonzero(blue)
     page.locator("canvas").last.click(position={"x": int(columns[0]), "y": int(rows[0])})
     page.locator(".edgel-point", has_text="boundary").wait_for()
-    row = int(re.search(r"row\s+([\d,]+)", page.locator(".edgel-point").inner_text())[1].replace(",", ""))
+    row = number_in(page.locator(".edgel-point").inner_text(), r"row\s+([\d,]+)")
     assert 0 <= row < 40_000
 
 
@@ -203,9 +212,10 @@ def test_pages_from_elsewhere_are_kept_out(served):
     import viser
     from websockets.exceptions import InvalidStatus
     from websockets.sync.client import connect
+    from websockets.typing import Origin, Subprotocol
 
     address = served[0].replace("http", "ws")
-    protocol = [f"viser-v{viser.__version__}"]
+    protocol = [Subprotocol(f"viser-v{viser.__version__}")]
     with pytest.raises(InvalidStatus, match="403"):
-        connect(address, origin="http://example.com", subprotocols=protocol)
-    connect(address, origin=served[0], subprotocols=protocol).close()
+        connect(address, origin=Origin("http://example.com"), subprotocols=protocol)
+    connect(address, origin=Origin(served[0]), subprotocols=protocol).close()

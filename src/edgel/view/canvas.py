@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import numpy as np
@@ -17,12 +18,15 @@ from edgel.view.session import LEAST_STRENGTH, Pane
 from edgel.view.settings import Settings
 
 _POINT = 1.3  # size of a point of the cloud, in spacings: no holes, and little drawn twice
-_EDGE = 2.2  # the same of an edge point, drawn on top of its neighbours
+_EDGE = 1.2  # size of an edge point, in those of the cloud
 _LEAST_EDGE = 0.007  # scene units: two pixels or three on a usual screen
+_SPARSE = 0.006  # scene units: points that lie far from each other for the most part are seen at that size
+_NOTHING = np.zeros((1, 3), np.float32), np.zeros((1, 3), np.uint8)
 _NORMAL, _TANGENT = 0.06, 0.05  # lengths of segments, scene units
 _LIFT = 0.012  # scene units from the surface to the tangents, which the edge points would hide
 _CELL = 0.03  # at most one segment a cell of this size, scene units
 _TANGENT_COLOR, _NORMAL_COLORS = (0, 150, 50), ((40, 40, 40), (190, 120, 20))
+_SETTLING = 5.0  # seconds in which a new tab finds its size
 _ABOVE = 0.12  # scene units from a cloud to its name
 _MARK_COLOR = (255, 220, 0)
 
@@ -52,8 +56,9 @@ class Canvas:
         shown = []
         with self._server.atomic():
             for number, (pane, place) in enumerate(zip(panes, self.layout.places, strict=True)):
-                self._draw_cloud(number, pane, place, settings)
+                # Edges first: of two points as far away the one drawn first is seen.
                 shown.append(self._draw_edges(number, pane, place, settings))
+                self._draw_cloud(number, pane, place, settings)
                 if len(panes) > 1:
                     self._label(f"/label{number}", pane.name, place)
         self.shown = shown
@@ -67,13 +72,26 @@ class Canvas:
             tab.camera.up_direction = (0.0, 0.0, 1.0)
             tab.camera.position, tab.camera.look_at = view.position, view.target
 
+    def greet(self, client: viser.ClientHandle) -> None:
+        """Let a new tab look at everything, and again when the panel has taken its place in it."""
+        self.look(client)
+        until, seen = time.monotonic() + _SETTLING, [client.camera.aspect]
+
+        def resized(camera: viser.CameraHandle) -> None:
+            if camera.aspect != seen[0] and time.monotonic() < until:
+                seen[0] = camera.aspect
+                self.look(client)
+
+        client.camera.on_update(resized)
+
     def mark(self, picked: Picked | None) -> None:
         """Put a ball on the edge point that was clicked."""
         self._remove("/picked")
         if picked is not None:
             at = self.shown[picked.pane][picked.edge]
+            radius = max(0.015, self._nodes[f"/edges{picked.pane}"].point_size)
             self._nodes["/picked"] = self._server.scene.add_icosphere(
-                "/picked", radius=0.012, color=_MARK_COLOR, opacity=0.8, position=at.astype(float)
+                "/picked", radius=radius, color=_MARK_COLOR, opacity=0.8, position=at.astype(float)
             )
 
     def _draw_cloud(self, number: int, pane: Pane, place: Place, settings: Settings) -> None:
@@ -86,7 +104,7 @@ class Canvas:
         if settings.is_cropped:
             inside = in_box(points, pane.box)
             points, colors = points[inside], colors[inside]
-        self._points(name, place.to_scene(points), colors, self._size(pane, place, settings, _POINT, 0.0))
+        self._points(name, place.to_scene(points), colors, settings.size * _point_size(pane, place))
 
     def _draw_edges(self, number: int, pane: Pane, place: Place, settings: Settings) -> np.ndarray:
         """Draw the edge points and their segments; return where the points are."""
@@ -100,27 +118,21 @@ class Canvas:
                 segments["tangents"] = _tangents(edges.take(rows), points[rows], place)
             if settings.normals:
                 segments["normals"] = _normals(edges.take(rows), points[rows], place)
-        self._points(f"/edges{number}", points, colors, self._size(pane, place, settings, _EDGE, _LEAST_EDGE))
+        size = settings.size * max(_EDGE * _point_size(pane, place), _LEAST_EDGE)
+        self._points(f"/edges{number}", points, colors, size)
         for name in ("tangents", "normals"):
             self._segments(f"/{name}{number}", segments.get(name))
         return points
 
-    def _size(self, pane: Pane, place: Place, settings: Settings, spacings: float, least: float) -> float:
-        drawn = pane.source.shown
-        # Where only a part is drawn the gaps are wider.
-        spread = 1.0 if not pane.source.is_thinned else np.sqrt(len(pane.cloud) / len(drawn))
-        return settings.size * max(spacings * float(spread) * pane.source.spacing * place.unit, least, 1e-4)
-
     def _points(self, name: str, points: np.ndarray, colors: np.ndarray, size: float) -> None:
         node = self._nodes.get(name)
-        if len(points) == 0:
-            self._remove(name)
-        elif node is None:
-            self._nodes[name] = self._server.scene.add_point_cloud(
-                name, points, colors, point_size=size, point_shape="square", precision="float32", point_shading="flat"
+        if node is None:
+            node = self._nodes[name] = self._server.scene.add_point_cloud(
+                name, *_NOTHING, point_shape="square", precision="float32", point_shading="flat", visible=False
             )
-        else:  # what did not change is not sent again
+        if len(points):  # what did not change is not sent again
             node.points, node.colors, node.point_size = points, colors, size
+        node.visible = len(points) > 0
 
     def _segments(self, name: str, segments: tuple[np.ndarray, np.ndarray] | None) -> None:
         self._remove(name)
@@ -145,6 +157,14 @@ class Canvas:
         for name in list(self._nodes):
             self._remove(name)
         self._drawn.clear()
+
+
+def _point_size(pane: Pane, place: Place) -> float:
+    """Size of the points of a cloud, in scene units: their spacing, more where most lie farther apart than that."""
+    drawn = len(pane.source.shown)
+    # Where only a part is drawn the gaps are wider.
+    spacing = pane.source.spacing * place.unit * np.sqrt(len(pane.cloud) / drawn if pane.source.is_thinned else 1.0)
+    return float(max(_POINT * spacing, min(2.0 / np.sqrt(drawn), _SPARSE)))
 
 
 def _tangents(edges: Edges, points: np.ndarray, place: Place) -> tuple[np.ndarray, np.ndarray]:

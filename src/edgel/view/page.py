@@ -46,7 +46,7 @@ class Page:
         self._controls.save_edges.on_click(self._save_edges)
         self._controls.save_picture.on_click(self._save_picture)
         server.scene.on_click()(self._click)
-        server.on_client_connect(self._canvas.look)
+        server.on_client_connect(self._canvas.greet)
         session.start(self.refresh)
 
     def refresh(self) -> None:

@@ -41,6 +41,8 @@ class Pane:
 
     Attributes
     ----------
+    name : str
+        What it is called on the page.
     source : Source
         Already read.
     cloud : Cloud
@@ -58,6 +60,7 @@ class Pane:
         Whether the edges are those asked for; not while the detector still runs.
     """
 
+    name: str
     source: Source
     cloud: Cloud
     preset: str
@@ -66,11 +69,6 @@ class Pane:
     edges: Edges | None
     box: np.ndarray
     is_current: bool
-
-    @property
-    def name(self) -> str:
-        """What the pane is called on the page."""
-        return f"{self.source.name} · {'paper' if self.preset == 'paper' else 'edgel'}"
 
 
 class Superseded(Exception):  # noqa: N818 - no error, a run that nobody waits for any more
@@ -156,7 +154,10 @@ class Session:
         edges = None
         if answer is not None and answer.edges is not None:
             edges = select(answer.edges, source.cloud.xyz, settings, box)
-        return Pane(source, source.cloud, preset, run, answer, edges, box, run == wanted)
+        name = source.name
+        if len(settings.presets) > 1:
+            name += " · paper" if preset == "paper" else " · edgel"
+        return Pane(name, source, source.cloud, preset, run, answer, edges, box, run == wanted)
 
     def _wanted_run(self, number: int, preset: str, settings: Settings) -> Run:
         return settings.run(number, preset, has_color=self.sources[number].has_color)

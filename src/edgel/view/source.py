@@ -17,8 +17,8 @@ from edgel.io.errors import describe_error
 from edgel.view.scale import median_spacing
 
 MAX_SHOWN = 3_000_000  # points that a browser turns without stutter
-_TAIL = 0.5  # percent of the points at either end that do not count for how far the cloud reaches
-_SLACK = 0.2  # of the reach without them: a cloud without outliers reaches as far as it does
+_TAIL = 2.5  # percent of the points at either end that do not count for how far the cloud reaches: a sweep's far ones
+_SLACK = 0.25  # of the reach without them: a cloud without outliers reaches as far as it does
 _SAMPLE = 200_000  # points that are enough to tell how far a cloud reaches
 
 
