@@ -26,7 +26,7 @@ from browser import choose, chromium, input_of, picture, type_number
 
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "view"
 SIZE = {"width": 1280, "height": 800}
-PATIENCE = 180_000  # ms: without a GPU, and beside other work, a frame of a large cloud may take seconds
+PATIENCE = 90_000  # ms: without a GPU, and beside other work, a frame of a large cloud may take seconds
 
 
 def shoot(browser: Any, name: str, folder: Path, files: list[str], act: Callable[[Any, Any], None]) -> None:

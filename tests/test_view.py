@@ -501,6 +501,7 @@ def test_clicks_choose_the_foremost():
     assert pick([far, near], *ray, max_angle=0.01) == Picked(1, 1)
     assert pick([far, near[:1]], *ray, max_angle=0.01) == Picked(0, 0)
     assert pick([far[:0], near[:1]], *ray, max_angle=0.01) is None
+    assert pick([far[:0], near[:1]], *ray, max_angle=0.01, radius=0.6) == Picked(1, 0)
     assert pick([-far], *ray, max_angle=0.01) is None
     assert pick([], *ray, max_angle=0.01) is None
 

@@ -19,6 +19,9 @@ from edgel.view.settings import Settings
 
 _POINT = 1.3  # size of a point of the cloud, in spacings: no holes, and little drawn twice
 _EDGE = 1.2  # size of an edge point, in those of the cloud
+_RISE = (
+    0.5  # sizes of a point by which edge points stand out on both sides of the surface, whose points would hide them
+)
 _LEAST_EDGE = 0.007  # scene units: two pixels or three on a usual screen
 _SPARSE = 0.006  # scene units: points that lie far from each other for the most part are seen at that size
 _NOTHING = np.zeros((1, 3), np.float32), np.zeros((1, 3), np.uint8)
@@ -56,9 +59,8 @@ class Canvas:
         shown = []
         with self._server.atomic():
             for number, (pane, place) in enumerate(zip(panes, self.layout.places, strict=True)):
-                # Edges first: of two points as far away the one drawn first is seen.
-                shown.append(self._draw_edges(number, pane, place, settings))
                 self._draw_cloud(number, pane, place, settings)
+                shown.append(self._draw_edges(number, pane, place, settings))
                 if len(panes) > 1:
                     self._label(f"/label{number}", pane.name, place)
         self.shown = shown
@@ -89,10 +91,14 @@ class Canvas:
         self._remove("/picked")
         if picked is not None:
             at = self.shown[picked.pane][picked.edge]
-            radius = max(0.015, self._nodes[f"/edges{picked.pane}"].point_size)
+            radius = max(0.015, self.edge_size(picked.pane))
             self._nodes["/picked"] = self._server.scene.add_icosphere(
                 "/picked", radius=radius, color=_MARK_COLOR, opacity=0.8, position=at.astype(float)
             )
+
+    def edge_size(self, pane: int) -> float:
+        """Size of the edge points of a pane, in scene units."""
+        return float(self._nodes[f"/edges{pane}"].point_size)
 
     def _draw_cloud(self, number: int, pane: Pane, place: Place, settings: Settings) -> None:
         source, name = pane.source, f"/cloud{number}"
@@ -119,7 +125,11 @@ class Canvas:
             if settings.normals:
                 segments["normals"] = _normals(edges.take(rows), points[rows], place)
         size = settings.size * max(_EDGE * _point_size(pane, place), _LEAST_EDGE)
-        self._points(f"/edges{number}", points, colors, size)
+        drawn = points
+        if edges is not None:
+            lift = (_RISE * _point_size(pane, place) * _outwards(edges, place)).astype(np.float32)
+            drawn, colors = np.concatenate([points + lift, points - lift]), np.concatenate([colors, colors])
+        self._points(f"/edges{number}", drawn, colors, size)
         for name in ("tangents", "normals"):
             self._segments(f"/{name}{number}", segments.get(name))
         return points
@@ -165,6 +175,13 @@ def _point_size(pane: Pane, place: Place) -> float:
     # Where only a part is drawn the gaps are wider.
     spacing = pane.source.spacing * place.unit * np.sqrt(len(pane.cloud) / drawn if pane.source.is_thinned else 1.0)
     return float(max(_POINT * spacing, min(2.0 / np.sqrt(drawn), _SPARSE)))
+
+
+def _outwards(edges: Edges, place: Place) -> np.ndarray:
+    """Unit vectors off the surface, between the normals of both faces, in the scene (E, 3); 0 where none is known."""
+    outwards = np.nan_to_num(edges.normals).sum(axis=1)
+    length = np.linalg.norm(outwards, axis=1, keepdims=True)
+    return outwards / np.where(length > 0, length, 1.0) @ place.rotation.T
 
 
 def _tangents(edges: Edges, points: np.ndarray, place: Place) -> tuple[np.ndarray, np.ndarray]:

@@ -120,7 +120,9 @@ class Page:
         camera = event.client.camera
         reach = _CLICK * 2 * np.tan(camera.fov / 2) / max(camera.image_height, 1)
         panes, shown = self._panes, self._canvas.shown
-        picked = pick(shown, np.array(event.ray_origin), np.array(event.ray_direction), max_angle=float(reach))
+        sizes = [self._canvas.edge_size(number) for number in range(len(shown))]
+        ray = np.array(event.ray_origin), np.array(event.ray_direction)
+        picked = pick(shown, *ray, max_angle=float(reach), radius=0.7 * max(sizes, default=0.0))
         self._canvas.mark(picked)
         self._controls.numbers.content = texts.numbers(
             None if picked is None else describe(panes[picked.pane], picked.edge)

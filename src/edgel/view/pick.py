@@ -29,7 +29,9 @@ class Picked:
     edge: int
 
 
-def pick(shown: Sequence[np.ndarray], origin: np.ndarray, direction: np.ndarray, *, max_angle: float) -> Picked | None:
+def pick(
+    shown: Sequence[np.ndarray], origin: np.ndarray, direction: np.ndarray, *, max_angle: float, radius: float = 0.0
+) -> Picked | None:
     """Find the edge point that a click meant.
 
     Parameters
@@ -40,6 +42,8 @@ def pick(shown: Sequence[np.ndarray], origin: np.ndarray, direction: np.ndarray,
         The ray of the click.
     max_angle : float
         How far from the ray a point may lie, in radians.
+    radius : float
+        How far it may lie anyway, in scene units: half its size.
 
     Returns
     -------
@@ -57,7 +61,7 @@ def pick(shown: Sequence[np.ndarray], origin: np.ndarray, direction: np.ndarray,
     rays = np.concatenate([np.empty((0, 3)), *shown]) - np.asarray(origin, float)
     along = rays @ direction
     off = np.linalg.norm(rays - along[:, None] * direction, axis=1)
-    near = np.flatnonzero((along > 0) & (off <= np.tan(max_angle) * along))
+    near = np.flatnonzero((along > 0) & (off <= np.maximum(np.tan(max_angle) * along, radius)))
     if len(near) == 0:
         return None
     front = near[along[near] <= along[near].min() + _SAME_DEPTH]
