@@ -28,20 +28,20 @@ LAYERS = [
 ]
 ONLY_CLOUD = {"io"}  # formats know the cloud (and the threads) and nothing else
 FREE = {
-    "synth",
-    "plot",
-    "drawing",
-    "scene",
     "camera",
-    "surface",
-    "legend",
-    "export",
-    "report",
-    "demo",
     "cli",
+    "demo",
+    "drawing",
+    "export",
     "figures",
+    "legend",
+    "plot",
+    "report",
+    "scene",
+    "surface",
+    "synth",
+    "view",
 }  # on top: may use everything above
-
 # What functions import when they are called, from rooms above: methods that hand edges on.
 LATER = {"edges": {"export"}}
 
@@ -99,7 +99,7 @@ def test_modules_stay_small(path):
 
 
 def test_import_is_light():
-    heavy = ["matplotlib", "laspy", "typer", "rich", "PIL", "pye57"]
+    heavy = ["matplotlib", "laspy", "typer", "rich", "PIL", "pye57", "viser"]
     code = f"import sys, edgel; print(*(m for m in {heavy} if m in sys.modules))"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert loaded == []

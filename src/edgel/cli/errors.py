@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import traceback
 from collections.abc import Collection, Iterator
@@ -12,6 +11,7 @@ from enum import IntEnum
 import typer
 
 from edgel.cli.output import print_json, print_line
+from edgel.io.errors import describe_error
 
 
 class ExitCode(IntEnum):
@@ -114,14 +114,6 @@ def as_option(name: str) -> str:
     '--num-neighbors'
     """
     return "--" + name.replace("_", "-")
-
-
-def describe_error(error: BaseException) -> str:
-    """Return the message of an error as a sentence, an OSError's without its number."""
-    if isinstance(error, OSError) and error.strerror:
-        what = error.strerror[:1].lower() + error.strerror[1:]
-        return f"{os.fsdecode(error.filename)}: {what}" if isinstance(error.filename, str | bytes) else what
-    return str(error) or type(error).__name__
 
 
 def _about(subject: str, message: str) -> str:

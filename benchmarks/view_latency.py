@@ -1,0 +1,105 @@
+"""How long the viewer takes from a move of a slider to the new edges: a table for 100,000, 650,000 and 3,000,000 points.
+
+Run: python benchmarks/view_latency.py [POINTS...]. Medians of ten moves of the threshold, in milliseconds:
+
+- server: from the new setting to everything handed to viser, without a browser
+- count: in Chromium, from the key to the new number of edges on the page
+- picture: in Chromium, from the key to the second frame after that, which shows the new edges
+- frame: what Chromium needs to draw one frame of the cloud. Here it draws in software; with a GPU this is a few ms.
+"""
+
+from __future__ import annotations
+
+import statistics
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import edgel
+from edgel import synth
+from edgel.view.server import running
+from edgel.view.settings import Settings
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
+from browser import chromium, input_of
+
+SIZES = (100_000, 650_000, 3_000_000)
+MOVES = 10
+PATIENCE = 300_000
+
+# Types a number into a slider's field as a user does, and waits for the page: first its text, then two more frames.
+MOVE = """async ([field, value]) => {
+    const status = document.querySelector('.edgel-status').innerText;
+    const set = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value').set;
+    const start = performance.now();
+    set.call(field, value);
+    field.dispatchEvent(new Event('input', {bubbles: true}));
+    while (document.querySelector('.edgel-status').innerText === status) await new Promise(r => setTimeout(r, 1));
+    const count = performance.now() - start;
+    for (let i = 0; i < 2; i++) await new Promise(requestAnimationFrame);
+    return [count, performance.now() - start];
+}"""
+FRAMES = """async () => {
+    const start = performance.now();
+    for (let i = 0; i < 10; i++) await new Promise(requestAnimationFrame);
+    return (performance.now() - start) / 10;
+}"""
+
+
+def in_server(session: Any, page: Any) -> list[float]:
+    """Milliseconds from settings to handles, without a browser."""
+    taken = []
+    for move in range(MOVES):
+        start = time.perf_counter()
+        session.settings = Settings(strength=0.6 + 0.03 * move)
+        page.refresh()
+        assert page.wait_idle(PATIENCE / 1000)
+        taken.append(1000 * (time.perf_counter() - start))
+    session.settings = Settings()
+    return taken
+
+
+def in_browser(tab: Any) -> tuple[list[float], list[float], float]:
+    counts, pictures = [], []
+    field = input_of(tab, "Strength ≥").element_handle()
+    for move in range(MOVES):
+        count, picture = tab.evaluate(MOVE, [field, f"{0.6 + 0.03 * move:.2f}"])
+        counts.append(count)
+        pictures.append(picture)
+        tab.wait_for_timeout(300)
+    return counts, pictures, tab.evaluate(FRAMES)
+
+
+def measure(browser: Any, num_points: int, folder: Path) -> str:
+    path = folder / "tee.ply"
+    edgel.write(path, synth.scan(synth.tee(), num_points=num_points).cloud)
+    with running([str(path)]) as (server, session, page):
+        assert session.wait_idle(PATIENCE / 1000)
+        assert page.wait_idle(PATIENCE / 1000)
+        alone = in_server(session, page)
+        tab = browser.new_page(viewport={"width": 1280, "height": 800})
+        tab.set_default_timeout(PATIENCE)
+        tab.goto(f"http://127.0.0.1:{server.get_port()}")
+        tab.locator(".edgel-pane", has_text="edge points shown").wait_for()
+        tab.wait_for_timeout(3000)
+        counts, pictures, frame = in_browser(tab)
+        found = len(session.panes()[0].answer.edges)
+        tab.close()
+    middle = [statistics.median(values) for values in (alone, counts, pictures)]
+    return f"| {num_points:,} | {found:,} | " + " | ".join(f"{value:.0f}" for value in (*middle, frame)) + " |"
+
+
+def main() -> None:
+    sizes = [int(word) for word in sys.argv[1:]] or SIZES
+    print(
+        "| points | edge points found | server, ms | count, ms | picture, ms | frame, ms |\n|---|---|---|---|---|---|"
+    )
+    with tempfile.TemporaryDirectory() as folder, chromium() as browser:
+        for size in sizes:
+            print(measure(browser, size, Path(folder)), flush=True)
+
+
+if __name__ == "__main__":
+    main()

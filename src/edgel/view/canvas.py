@@ -1,0 +1,211 @@
+"""The scene of the page: clouds, edge points, segments, drawn from the panes of a session."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+import viser
+
+from edgel.edges import Edges
+from edgel.view.colors import cloud_colors, edge_colors
+from edgel.view.layout import FIELD_OF_VIEW, Layout, Place, lay_out
+from edgel.view.pick import Picked
+from edgel.view.scale import thin
+from edgel.view.select import in_box
+from edgel.view.session import LEAST_STRENGTH, Pane
+from edgel.view.settings import Settings
+
+_POINT = 1.3  # size of a point of the cloud, in spacings: no holes, and little drawn twice
+_EDGE = 1.2  # size of an edge point, in those of the cloud
+_RISE = (
+    0.5  # sizes of a point by which edge points stand out on both sides of the surface, whose points would hide them
+)
+_LEAST_EDGE = 0.007  # scene units: two pixels or three on a usual screen
+_SPARSE = 0.006  # scene units: points that lie far from each other for the most part are seen at that size
+_NOTHING = np.zeros((1, 3), np.float32), np.zeros((1, 3), np.uint8)
+_NORMAL, _TANGENT = 0.06, 0.05  # lengths of segments, scene units
+_LIFT = 0.012  # scene units from the surface to the tangents, which the edge points would hide
+_CELL = 0.03  # at most one segment a cell of this size, scene units
+_TANGENT_COLOR, _NORMAL_COLORS = (0, 150, 50), ((40, 40, 40), (190, 120, 20))
+_SETTLING = 5.0  # seconds in which a new tab finds its size
+_ABOVE = 0.12  # scene units from a cloud to its name
+_MARK_COLOR = (255, 220, 0)
+
+
+class Canvas:
+    """Handles of what is drawn. Only one thread may call `draw` at a time."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        self._nodes: dict[str, Any] = {}
+        self._drawn: dict[str, Any] = {}
+        self._laid_out: list[int] = []
+        self.layout: Layout | None = None
+        self.shown: list[np.ndarray] = []
+        server.initial_camera.fov = FIELD_OF_VIEW
+
+    def draw(self, panes: list[Pane], settings: Settings) -> None:
+        """Make the scene show these panes."""
+        if not panes:
+            return
+        sources = [id(pane.source) for pane in panes]
+        if sources != self._laid_out:
+            self._clear()
+            self.layout, self._laid_out = lay_out([pane.source for pane in panes]), sources
+            self.look()
+        assert self.layout is not None
+        shown = []
+        with self._server.atomic():
+            for number, (pane, place) in enumerate(zip(panes, self.layout.places, strict=True)):
+                self._draw_cloud(number, pane, place, settings)
+                shown.append(self._draw_edges(number, pane, place, settings))
+                if len(panes) > 1:
+                    self._label(f"/label{number}", pane.name, place)
+        self.shown = shown
+
+    def look(self, client: viser.ClientHandle | None = None) -> None:
+        """Look at everything, in one tab or in all."""
+        if self.layout is None:
+            return
+        for tab in [client] if client is not None else self._server.get_clients().values():
+            view = self.layout.view(tab.camera.aspect)
+            tab.camera.up_direction = (0.0, 0.0, 1.0)
+            tab.camera.position, tab.camera.look_at = view.position, view.target
+
+    def greet(self, client: viser.ClientHandle) -> None:
+        """Let a new tab look at everything, and again when the panel has taken its place in it."""
+        self.look(client)
+        until, seen = time.monotonic() + _SETTLING, [client.camera.aspect]
+
+        def resized(camera: viser.CameraHandle) -> None:
+            if camera.aspect != seen[0] and time.monotonic() < until:
+                seen[0] = camera.aspect
+                self.look(client)
+
+        client.camera.on_update(resized)
+
+    def mark(self, picked: Picked | None) -> None:
+        """Put a ball on the edge point that was clicked."""
+        self._remove("/picked")
+        if picked is not None:
+            at = self.shown[picked.pane][picked.edge]
+            radius = max(0.015, self.edge_size(picked.pane))
+            self._nodes["/picked"] = self._server.scene.add_icosphere(
+                "/picked", radius=radius, color=_MARK_COLOR, opacity=0.8, position=at.astype(float)
+            )
+
+    def edge_size(self, pane: int) -> float:
+        """Size of the edge points of a pane, in scene units."""
+        return float(self._nodes[f"/edges{pane}"].point_size)
+
+    def _draw_cloud(self, number: int, pane: Pane, place: Place, settings: Settings) -> None:
+        source, name = pane.source, f"/cloud{number}"
+        key = (settings.coloring, settings.crop, settings.size, source.normals is not None)
+        if self._drawn.get(name) == key:  # nearly always, and comparing millions of points would take its time
+            return
+        self._drawn[name] = key
+        points, colors = pane.cloud.xyz[source.shown], cloud_colors(source, settings.coloring, place.rotation)
+        if settings.is_cropped:
+            inside = in_box(points, pane.box)
+            points, colors = points[inside], colors[inside]
+        self._points(name, place.to_scene(points), colors, settings.size * _point_size(pane, place))
+
+    def _draw_edges(self, number: int, pane: Pane, place: Place, settings: Settings) -> np.ndarray:
+        """Draw the edge points and their segments; return where the points are."""
+        points, colors, segments = np.empty((0, 3), np.float32), np.empty((0, 3), np.uint8), {}
+        edges = pane.edges
+        if edges is not None and len(edges):
+            points = place.to_scene(pane.cloud.xyz[edges.index])
+            colors = edge_colors(edges, by_strength=settings.by_strength, least=LEAST_STRENGTH)
+            rows = _spread(points) if settings.tangents or settings.normals else np.empty(0, np.int64)
+            if settings.tangents:
+                segments["tangents"] = _tangents(edges.take(rows), points[rows], place)
+            if settings.normals:
+                segments["normals"] = _normals(edges.take(rows), points[rows], place)
+        size = settings.size * max(_EDGE * _point_size(pane, place), _LEAST_EDGE)
+        drawn = points
+        if edges is not None:
+            lift = (_RISE * _point_size(pane, place) * _outwards(edges, place)).astype(np.float32)
+            drawn, colors = np.concatenate([points + lift, points - lift]), np.concatenate([colors, colors])
+        self._points(f"/edges{number}", drawn, colors, size)
+        for name in ("tangents", "normals"):
+            self._segments(f"/{name}{number}", segments.get(name))
+        return points
+
+    def _points(self, name: str, points: np.ndarray, colors: np.ndarray, size: float) -> None:
+        node = self._nodes.get(name)
+        if node is None:
+            node = self._nodes[name] = self._server.scene.add_point_cloud(
+                name, *_NOTHING, point_shape="square", precision="float32", point_shading="flat", visible=False
+            )
+        if len(points):  # what did not change is not sent again
+            node.points, node.colors, node.point_size = points, colors, size
+        node.visible = len(points) > 0
+
+    def _segments(self, name: str, segments: tuple[np.ndarray, np.ndarray] | None) -> None:
+        self._remove(name)
+        if segments is not None and len(segments[0]):
+            self._nodes[name] = self._server.scene.add_line_segments(
+                name, *segments, thickness=2.0, thickness_units="screen"
+            )
+
+    def _label(self, name: str, text: str, place: Place) -> None:
+        if name not in self._nodes:
+            assert self.layout is not None
+            up = np.cross(self.layout.right, self.layout.away)
+            above = place.offset + (np.abs(up) @ place.half + _ABOVE) * up
+            self._nodes[name] = self._server.scene.add_label(name, text, position=above)
+
+    def _remove(self, name: str) -> None:
+        node = self._nodes.pop(name, None)
+        if node is not None:
+            node.remove()
+
+    def _clear(self) -> None:
+        for name in list(self._nodes):
+            self._remove(name)
+        self._drawn.clear()
+
+
+def _point_size(pane: Pane, place: Place) -> float:
+    """Size of the points of a cloud, in scene units: their spacing, more where most lie farther apart than that."""
+    drawn = len(pane.source.shown)
+    # Where only a part is drawn the gaps are wider.
+    spacing = pane.source.spacing * place.unit * np.sqrt(len(pane.cloud) / drawn if pane.source.is_thinned else 1.0)
+    return float(max(_POINT * spacing, min(2.0 / np.sqrt(drawn), _SPARSE)))
+
+
+def _outwards(edges: Edges, place: Place) -> np.ndarray:
+    """Unit vectors off the surface, between the normals of both faces, in the scene (E, 3); 0 where none is known."""
+    outwards = np.nan_to_num(edges.normals).sum(axis=1)
+    length = np.linalg.norm(outwards, axis=1, keepdims=True)
+    return outwards / np.where(length > 0, length, 1.0) @ place.rotation.T
+
+
+def _tangents(edges: Edges, points: np.ndarray, place: Place) -> tuple[np.ndarray, np.ndarray]:
+    """Segments along the edge, (S, 2, 3), and their colors, (S, 2, 3) uint8."""
+    along, normals = edges.direction @ place.rotation.T, edges.normals[:, 0] @ place.rotation.T
+    known = np.isfinite(along[:, 0])
+    middle = (points + _LIFT * np.nan_to_num(normals))[known]
+    half = _TANGENT / 2 * along[known]
+    ends = np.stack([middle - half, middle + half], axis=1)
+    return ends, np.full((len(ends), 2, 3), _TANGENT_COLOR, np.uint8)
+
+
+def _normals(edges: Edges, points: np.ndarray, place: Place) -> tuple[np.ndarray, np.ndarray]:
+    """Segments along the normals of both faces, (S, 2, 3), and their colors, (S, 2, 3) uint8."""
+    ends, colors = [], []
+    for face, color in enumerate(_NORMAL_COLORS):
+        normals = edges.normals[:, face] @ place.rotation.T
+        known = np.isfinite(normals[:, 0])
+        start = points[known]
+        ends.append(np.stack([start, start + _NORMAL * normals[known]], axis=1))
+        colors.append(np.full((len(start), 2, 3), color, np.uint8))
+    return np.concatenate(ends), np.concatenate(colors)
+
+
+def _spread(points: np.ndarray) -> np.ndarray:
+    """Rows of an even selection of the points: segments at all of them would be a carpet."""
+    return thin(points, _CELL) if len(points) >= 3 else np.arange(len(points))

@@ -1,0 +1,122 @@
+"""Colors of clouds and edges, (N, 3) uint8."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from edgel.color.channels import color_channels
+from edgel.edges import EdgeKind, Edges
+from edgel.view.settings import Coloring
+from edgel.view.source import Source
+
+KIND_COLORS: dict[EdgeKind, tuple[int, int, int]] = {
+    EdgeKind.OCCLUDING: (235, 110, 0),
+    EdgeKind.OCCLUDED: (140, 60, 190),
+    EdgeKind.BOUNDARY: (0, 90, 220),
+    EdgeKind.CREASE: (205, 0, 30),
+    EdgeKind.COLOR: (0, 140, 60),
+    EdgeKind.IMAGE: (200, 0, 130),
+}
+"""A point of several kinds has the color of the one that comes first."""
+
+KIND_MEANINGS: dict[EdgeKind, str] = {
+    EdgeKind.OCCLUDING: "near side of a step in depth",
+    EdgeKind.OCCLUDED: "far side, behind it",
+    EdgeKind.BOUNDARY: "the surface ends",
+    EdgeKind.CREASE: "two faces meet",
+    EdgeKind.COLOR: "a step in color or intensity",
+    EdgeKind.IMAGE: "edge of the projected image",
+}
+
+STRENGTH_RAMP = np.array([[255, 214, 90], [240, 120, 20], [190, 20, 40], [80, 0, 60]], float)
+_HEIGHT_RAMP = np.array([[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [240, 220, 60]], float)
+_LIGHT = np.array([-0.35, -0.45, 0.82])  # towards the light, in the scene: from the left, the front and above
+_GREYS = (105.0, 232.0)
+_FLAT_GREY = 180
+
+
+def colorings(source: Source) -> list[Coloring]:
+    """Return what the points of a file can be colored by."""
+    found = [Coloring.GREY, Coloring.HEIGHT, Coloring.NORMALS]
+    if source.cloud is not None:
+        channels = color_channels(source.cloud)
+        if channels is not None and channels.shape[1] == 3:
+            found.append(Coloring.OWN)
+        if _intensity(source) is not None:
+            found.append(Coloring.INTENSITY)
+    return found
+
+
+def cloud_colors(source: Source, coloring: Coloring, rotation: np.ndarray) -> np.ndarray:
+    """Color the points of a file that are drawn.
+
+    Parameters
+    ----------
+    source : Source
+        Already read.
+    coloring : Coloring
+        Grey where the file does not carry it.
+    rotation : (3, 3) float64
+        Turns directions of the cloud into those of the scene, whose light shades the grey.
+    """
+    assert source.cloud is not None
+    if coloring is Coloring.OWN:
+        channels = color_channels(source.cloud)
+        if channels is not None and channels.shape[1] == 3:
+            return _rgb(channels[source.shown])
+    if coloring is Coloring.INTENSITY:
+        channel = _intensity(source)
+        if channel is not None:
+            return _ramp(channel, np.array([[20.0] * 3, [245.0] * 3]))
+    if coloring is Coloring.HEIGHT:
+        height = source.cloud.xyz[source.shown] @ rotation[2]
+        low, high = np.percentile(height, [1.0, 99.0])
+        return _ramp((height - low) / max(high - low, 1e-300), _HEIGHT_RAMP)
+    if source.normals is None:
+        return np.full((len(source.shown), 3), _FLAT_GREY, np.uint8)
+    normals = source.normals @ rotation.T.astype(np.float32)
+    if coloring is Coloring.NORMALS:
+        return (127.5 * np.nan_to_num(normals) + 128).astype(np.uint8)
+    light = np.clip(np.nan_to_num(normals @ _LIGHT.astype(np.float32)) * 0.65 + 0.35, 0.0, 1.0)
+    grey = (_GREYS[0] + (_GREYS[1] - _GREYS[0]) * light).astype(np.uint8)
+    return grey[:, None].repeat(3, axis=1)
+
+
+def edge_colors(edges: Edges, *, by_strength: bool, least: float) -> np.ndarray:
+    """Color edge points by their kind, or by strength from `least` (light) to 1 (dark)."""
+    if by_strength:
+        if edges.preset == "paper":  # its strengths are shares of the largest step there can be: all small
+            least, largest = 0.0, edges.strength.max(initial=1e-9)
+            return _ramp(edges.strength / largest, STRENGTH_RAMP)
+        return _ramp((edges.strength - least) / max(1.0 - least, 1e-9), STRENGTH_RAMP)
+    colors = np.zeros((len(edges), 3), np.uint8)
+    for kind, color in reversed(KIND_COLORS.items()):
+        colors[(edges.kind & kind) > 0] = color
+    return colors
+
+
+def _intensity(source: Source) -> np.ndarray | None:
+    """Intensity of the points drawn, 0 to 1, None where the file has none."""
+    assert source.cloud is not None
+    attributes = {
+        name: v for name, v in source.cloud.attributes.items() if name.lower() not in ("red", "green", "blue")
+    }
+    channels = color_channels(replace(source.cloud, attributes=attributes))
+    return None if channels is None else channels[source.shown, 0]
+
+
+def _rgb(channels: np.ndarray) -> np.ndarray:
+    """Undo the channels of `edgel.color`: brightness, red against blue, green against magenta."""
+    brightness, red_blue, green = np.nan_to_num(channels, nan=0.5).T
+    red_blue, green = 2 * (red_blue - 0.5), 4 / 3 * (green - 0.5)
+    g = brightness + green
+    rest = brightness - green / 2
+    return (255 * np.clip(np.column_stack([rest + red_blue / 2, g, rest - red_blue / 2]), 0, 1) + 0.5).astype(np.uint8)
+
+
+def _ramp(values: np.ndarray, stops: np.ndarray) -> np.ndarray:
+    at = np.nan_to_num(np.clip(values, 0.0, 1.0))
+    along = np.linspace(0.0, 1.0, len(stops))
+    return np.column_stack([np.interp(at, along, channel) for channel in stops.T]).astype(np.uint8)

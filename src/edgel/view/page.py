@@ -1,0 +1,167 @@
+"""The page: keeps controls, texts and scene in step with the session."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import numpy as np
+import viser
+
+from edgel.io.errors import describe_error
+from edgel.paper import PaperEdges
+from edgel.view import texts
+from edgel.view.canvas import Canvas
+from edgel.view.colors import colorings
+from edgel.view.commands import command_line, python_lines
+from edgel.view.controls import Controls
+from edgel.view.latest import Latest
+from edgel.view.pick import describe, pick
+from edgel.view.save import edges_file, picture_file
+from edgel.view.session import Pane, Session
+
+_CLICK = 8  # pixels that a click may miss an edge point by
+
+
+class Page:
+    """One page for all tabs: what one changes, the others show.
+
+    Callbacks of viser come from many threads, in any order. They only take over the settings; drawing is the work of
+    one thread, which shows what is wanted when it begins.
+    """
+
+    def __init__(self, server: viser.ViserServer, session: Session) -> None:
+        self._session = session
+        self._lock = threading.Lock()
+        self._images: dict[str, tuple[Any, viser.GuiImageHandle]] = {}
+        self._panes: list[Pane] = []
+        self._server = server
+        server.gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
+        server.gui.set_panel_label("edgel view")
+        server.gui.main_panel.dock_right()
+        self._canvas = Canvas(server)
+        self._controls = Controls(server, self._take_over)
+        self._painter = Latest(self._paint, "edgel view painter")
+        self._controls.look.on_click(lambda event: self._canvas.look(event.client))
+        self._controls.save_edges.on_click(self._save_edges)
+        self._controls.save_picture.on_click(self._save_picture)
+        server.scene.on_click()(self._click)
+        server.on_client_connect(self._canvas.greet)
+        session.start(self.refresh)
+
+    def refresh(self) -> None:
+        """Draw anew, soon."""
+        self._painter.wake()
+
+    def wait_idle(self, timeout: float | None = None) -> bool:
+        """Wait until all is drawn, at most `timeout` seconds, and say whether it is."""
+        return self._painter.wait_idle(timeout)
+
+    def close(self) -> None:
+        """Draw no more, and let a drawing under way come to its end, so that viser may stop."""
+        self._painter.close()
+        self._painter.wait_idle(2.0)
+
+    def _take_over(self) -> None:
+        with self._lock:  # read and assigned at once, or an older reading could come last
+            self._session.settings = self._controls.settings()
+        self._painter.wake()
+
+    def _paint(self) -> None:
+        session, controls = self._session, self._controls
+        settings = session.settings
+        panes = session.panes(settings)
+        if panes:
+            sources = [pane.source for pane in panes]
+            controls.offer(sources, [coloring for source in sources for coloring in colorings(source)])
+        controls.fit_method(settings)
+        pane = controls.choose_pane(panes)
+        self._canvas.draw(panes, settings)
+        if any(new.edges is not old.edges for new, old in zip(panes, self._panes, strict=False)):
+            self._canvas.mark(None)
+        self._panes = panes
+        self._show_images(panes)
+        controls.status.content = texts.status(session, panes, settings)
+        controls.legend.content = texts.legend(panes, settings)
+        lines = (
+            {}
+            if pane is None
+            else {
+                "Copy command line": command_line(pane, settings),
+                "Copy Python": python_lines(pane, settings),
+            }
+        )
+        controls.code.content = texts.code(lines)
+
+    def _show_images(self, panes: list[Pane]) -> None:
+        """Show the projection and the edge map of each pane of the published method."""
+        wanted: dict[str, tuple[Any, np.ndarray]] = {}
+        for pane in panes:
+            found = None if pane.answer is None else pane.answer.edges
+            if isinstance(found, PaperEdges):
+                for what, image in (("projection", found.image), ("edge map", found.edge_map * 255.0)):
+                    wanted[f"{pane.source.name}: {what}"] = (pane.run, image[::-1])
+        for name in [name for name in self._images if name not in wanted]:
+            self._images.pop(name)[1].remove()
+        for name, (run, image) in wanted.items():
+            if name in self._images and self._images[name][0] == run:
+                continue
+            picture = image.astype(np.uint8)[..., None].repeat(3, axis=2)
+            if name in self._images:
+                handle = self._images[name][1]
+                handle.image = picture
+            else:
+                with self._controls.images:
+                    handle = self._server.gui.add_image(picture, label=name, format="png")
+            self._images[name] = run, handle
+
+    def _click(self, event: viser.SceneClickEvent) -> None:
+        """Show the numbers of the edge point that was clicked."""
+        camera = event.client.camera
+        reach = _CLICK * 2 * np.tan(camera.fov / 2) / max(camera.image_height, 1)
+        panes, shown = self._panes, self._canvas.shown
+        sizes = [self._canvas.edge_size(number) for number in range(len(shown))]
+        ray = np.array(event.ray_origin), np.array(event.ray_direction)
+        picked = pick(shown, *ray, max_angle=float(reach), radius=0.7 * max(sizes, default=0.0))
+        self._canvas.mark(picked)
+        self._controls.numbers.content = texts.numbers(
+            None if picked is None else describe(panes[picked.pane], picked.edge)
+        )
+
+    def _save_edges(self, event: viser.GuiEvent[Any]) -> None:
+        pane = self._saved_pane(event)
+        if pane is not None:
+            self._send(event, lambda: edges_file(pane, self._controls.format.value))
+
+    def _save_picture(self, event: viser.GuiEvent[Any]) -> None:
+        pane, client = self._saved_pane(event), event.client
+        if pane is None or client is None:
+            return
+        layout, panes = self._canvas.layout, self._panes
+        names = [shown.name for shown in panes]
+        if layout is not None and pane.name in names:
+            away = client.camera.look_at - client.camera.position
+            direction = layout.places[names.index(pane.name)].to_cloud(away)
+            self._send(event, lambda: picture_file(pane, direction))
+
+    def _saved_pane(self, event: viser.GuiEvent[Any]) -> Pane | None:
+        """Return the pane chosen, with the edges that the settings ask for now; say so where there are none yet."""
+        pane = self._controls.choose_pane(self._session.panes())
+        if pane is not None and pane.is_current and pane.edges is not None:
+            return pane
+        if event.client is not None:
+            event.client.add_notification(
+                "Nothing to save yet", "There are no edges, or they are still being found.", color="yellow"
+            )
+        return None
+
+    def _send(self, event: viser.GuiEvent[Any], make: Any) -> None:
+        """Send a file to the tab that asked, or the reason why there is none."""
+        if event.client is None:
+            return
+        try:
+            name, content = make()
+        except (ValueError, TypeError, ImportError, OSError, MemoryError) as error:
+            event.client.add_notification("Could not be saved", describe_error(error), color="red")
+            return
+        event.client.send_file_download(name, content, save_immediately=True)

@@ -1,0 +1,133 @@
+"""Edges of a given size: the detector on a thinned cloud, where what is smaller cannot be seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+
+import edgel
+from edgel.cloud import as_cloud, check_points
+from edgel.detect import DEFAULT_KINDS
+from edgel.edges import EdgeKind, Edges
+from edgel.kdtree import build_index
+from edgel.neighbors import knn
+
+
+def median_spacing(points: Any) -> float:
+    """Return the median distance of the points to their nearest neighbour, in the cloud's unit.
+
+    Points at the very place of another do not count; 0 where all are.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> x, y = np.meshgrid(np.arange(10.0), np.arange(10.0))
+    >>> median_spacing(np.c_[x.ravel(), y.ravel(), 0 * x.ravel()])
+    1.0
+    """
+    xyz = check_points(points).xyz
+    nearest = knn(build_index(xyz), xyz, 2).distances[:, 1]
+    nearest = nearest[nearest > 0]
+    return float(np.median(nearest)) if len(nearest) else 0.0
+
+
+def thin(points: Any, size: float) -> np.ndarray:
+    """Choose one point of each voxel: the one nearest to its middle.
+
+    Parameters
+    ----------
+    points : (N, 3) or (H, W, 3) array_like, Cloud, or an object that carries points
+    size : float
+        Side of a voxel, in the cloud's unit, above 0; the voxels begin at the cloud's smallest coordinates.
+
+    Returns
+    -------
+    (M,) int64
+        Rows of the input, ascending. Which places are chosen does not depend on the order of the points.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If `points` carries fewer than 3 finite points, or the size is not above 0.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> thin(np.array([[0.0, 0, 0], [0.4, 0, 0], [2.5, 0, 0], [3.0, 3.0, 0]]), 1.0)
+    array([1, 2, 3])
+    """
+    if not (np.isfinite(size) and size > 0):
+        raise ValueError(f"size: expected a length above 0, in the cloud's unit, got {size}")
+    checked = check_points(points)
+    xyz = checked.xyz
+    place = (xyz - xyz.min(axis=0)) / size
+    cell = np.floor(place)
+    voxel = np.zeros(len(xyz), np.int64)
+    for axis in range(3):  # numbered anew each time, so that the numbers stay small
+        _, along = np.unique(cell[:, axis], return_inverse=True)
+        _, voxel = np.unique(voxel * (along.max() + 1) + along, return_inverse=True)
+    away = ((place - cell - 0.5) ** 2).sum(axis=1)
+    least = np.full(voxel.max() + 1, np.inf)
+    np.minimum.at(least, voxel, away)
+    best = np.flatnonzero(away <= least[voxel])
+    order = best[np.lexsort((best, xyz[best, 2], xyz[best, 1], xyz[best, 0], voxel[best]))]
+    _, first = np.unique(voxel[order], return_index=True)
+    return checked.rows[np.sort(order[first])]
+
+
+def detect_at_scale(
+    points: Any,
+    scale: float = 1.0,
+    *,
+    preset: Literal["default", "paper"] = "default",
+    kinds: EdgeKind | str | Iterable[str] = DEFAULT_KINDS,
+    min_strength: float = 0.5,
+    progress: Callable[[str], None] | None = None,
+) -> Edges:
+    """Find edges larger than some spacings: `edgel.detect` on the cloud thinned to one point a voxel of that size.
+
+    Parameters
+    ----------
+    points, preset, kinds, min_strength, progress
+        As for `edgel.detect`; the published method takes neither kinds nor strength.
+    scale : float
+        Side of the voxels, in median spacings, 1 or more. At 1 the cloud is not thinned.
+
+    Returns
+    -------
+    Edges
+        Their rows are those of the whole input, and so is `num_points`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As for `edgel.detect`, and if the scale is below 1.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> x, y = np.meshgrid(np.arange(60.0), np.arange(60.0))
+    >>> roof = np.c_[x.ravel(), y.ravel(), -abs(x.ravel() - 30)]
+    >>> edges = detect_at_scale(roof, 2.0, kinds="crease")
+    >>> bool((abs(roof[edges.index, 0] - 30) < 2).all()), edges.num_points
+    (True, 3600)
+    """
+    if not (np.isfinite(scale) and scale >= 1):
+        raise ValueError(f"scale: expected 1 (all points) or more, in median spacings, got {scale}")
+    cloud = as_cloud(points)
+    if scale == 1:
+        return _detect(cloud, preset, kinds, min_strength, progress)
+    rows = thin(cloud, scale * median_spacing(cloud))
+    edges = _detect(cloud.take(rows), preset, kinds, min_strength, progress)
+    dropped = len(cloud) - len(check_points(cloud).rows)
+    return replace(edges, index=rows[edges.index], num_points=len(cloud), num_dropped=dropped)
+
+
+def _detect(cloud: edgel.Cloud, preset: Any, kinds: Any, min_strength: float, progress: Any) -> Edges:
+    if preset == "paper":
+        return edgel.detect(cloud, preset=preset, progress=progress)
+    edges = edgel.detect(cloud, kinds=kinds, progress=progress)
+    return edges.take(edges.strength >= min_strength)

@@ -1,0 +1,114 @@
+"""A file in the viewer: its cloud or why it cannot be read, and what is needed to show it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+import edgel
+from edgel.camera import Camera, choose_camera
+from edgel.cloud import Cloud, check_points
+from edgel.color import color_channels
+from edgel.io.errors import describe_error
+from edgel.view.scale import median_spacing
+
+MAX_SHOWN = 3_000_000  # points that a browser turns without stutter
+_TAIL = 2.5  # percent of the points at either end that do not count for how far the cloud reaches: a sweep's far ones
+_SLACK = 0.25  # of the reach without them: a cloud without outliers reaches as far as it does
+_SAMPLE = 200_000  # points that are enough to tell how far a cloud reaches
+
+
+class Source:
+    """A file, read by `load`; until then, and when it cannot be read, `cloud` is None.
+
+    Parameters
+    ----------
+    path : path
+    intrinsics : path, optional
+        The camera of a depth image.
+    read : callable
+        Reads a cloud, as `edgel.read` does.
+
+    Attributes
+    ----------
+    cloud : Cloud or None
+    error : str
+        Why it cannot be read; empty if it can.
+    shown : (S,) int64
+        Rows that are drawn: the finite ones, or an even random part of them.
+    normals : (S, 3) float32 or None
+        Of the rows drawn; None until `estimate_normals` was called.
+    spacing : float
+        Median distance to the nearest neighbour, in the cloud's unit.
+    camera : Camera
+        From where the cloud alone is best looked at.
+    low, high : (3,) float64
+        How far it reaches along its axes, without a few outliers.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        intrinsics: str | os.PathLike[str] | None = None,
+        read: Callable[..., Cloud] = edgel.read,
+    ) -> None:
+        self.path, self.name, self.intrinsics = os.fspath(path), Path(path).name, intrinsics
+        self._read = read
+        self.cloud: Cloud | None = None
+        self.error = ""
+        self.shown = np.empty(0, np.int64)
+        self.normals: np.ndarray | None = None
+        self.spacing = 0.0
+        self.camera: Camera
+        self.low, self.high = np.zeros(3), np.ones(3)
+
+    @property
+    def is_done(self) -> bool:
+        """Whether it was read, or failed to be."""
+        return self.cloud is not None or bool(self.error)
+
+    @property
+    def is_thinned(self) -> bool:
+        """Whether only a part of the points is drawn."""
+        return len(self.shown) == MAX_SHOWN
+
+    @cached_property
+    def has_color(self) -> bool:
+        """Whether the cloud, already read, has colors or an intensity whose edges could be found."""
+        return self.cloud is not None and color_channels(self.cloud) is not None
+
+    def load(self) -> None:
+        """Read the file; what is wrong with it becomes `error`, whatever it is."""
+        try:
+            cloud = self._read(self.path, intrinsics=self.intrinsics)
+            rows = check_points(cloud).rows
+            if len(rows) > MAX_SHOWN:
+                chosen = np.random.default_rng(0).choice(len(rows), MAX_SHOWN, replace=False, shuffle=False)
+                rows = rows[np.sort(chosen)]
+            self.shown = rows
+            self.spacing = median_spacing(cloud)
+            self.camera = choose_camera(cloud, "auto")
+            self.low, self.high = reach(cloud.xyz[rows])
+            self.cloud = cloud
+        except MemoryError:
+            self.error = "not enough memory; thin the cloud or cut it into parts"
+        except Exception as error:
+            self.error = describe_error(error)
+
+    def estimate_normals(self) -> None:
+        """Fit the normals of the points drawn, which the grey is shaded by."""
+        if self.cloud is not None and self.normals is None:
+            self.normals = edgel.estimate_normals(self.cloud, at=self.shown).normals.astype(np.float32)
+
+
+def reach(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lower and the upper corner of points (N, 3), (3,) each, far outliers left out."""
+    sample = xyz[:: -(-len(xyz) // _SAMPLE)]
+    low, high = np.percentile(sample, [_TAIL, 100.0 - _TAIL], axis=0)
+    slack = _SLACK * (high - low)
+    return np.maximum(xyz.min(axis=0), low - slack), np.minimum(xyz.max(axis=0), high + slack)

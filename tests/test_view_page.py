@@ -1,0 +1,221 @@
+"""The viewer in a real browser: Chromium, headless, driven by Playwright."""
+
+import importlib.util
+import re
+import time
+
+import numpy as np
+import pytest
+from browser import CHROMIUM, choose, chromium, input_of, picture, type_number
+
+import edgel
+from edgel import EdgeKind, synth
+from edgel.view.colors import KIND_COLORS
+
+for needed in ("viser", "playwright"):
+    if importlib.util.find_spec(needed) is None:
+        pytest.skip(f"{needed} is not installed (extras view and dev)", allow_module_level=True)
+if CHROMIUM is None:
+    pytest.skip("chromium is not installed (apt install chromium)", allow_module_level=True)
+
+TIMEOUT = 60.0
+
+
+def wait_for(condition, what):
+    end = time.monotonic() + TIMEOUT
+    while time.monotonic() < end:
+        if condition():
+            return
+        time.sleep(0.05)
+    pytest.fail(f"waited in vain for {what}")
+
+
+def shown(page):
+    """The number of edge points that the page says it shows."""
+    return number_in(page.locator(".edgel-status").inner_text(), r"([\d,]+) edge points shown")
+
+
+def number_in(text, pattern):
+    found = re.search(pattern, text)
+    assert found is not None, text
+    return int(found[1].replace(",", ""))
+
+
+def count_pixels(page, kind):
+    return int((abs(picture(page) - KIND_COLORS[kind]).max(axis=2) < 12).sum())
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("view")
+
+
+@pytest.fixture(scope="module")
+def tee(folder):
+    """A tee of 40,000 points, which software draws in no time."""
+    path = folder / "tee.ply"
+    edgel.write(path, synth.scan(synth.tee(), num_points=40_000).cloud)
+    return path
+
+
+@pytest.fixture(scope="module")
+def served(folder, tee):
+    from edgel.view.server import running
+
+    damaged = folder / "<b>damaged.ply"
+    damaged.write_bytes(tee.read_bytes()[:5000])
+    with running([str(tee), str(damaged)]) as (server, session, _):
+        yield f"http://127.0.0.1:{server.get_port()}", session
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with chromium() as browser:
+        yield browser
+
+
+@pytest.fixture(scope="module")
+def errors():
+    return []
+
+
+@pytest.fixture(scope="module")
+def page(browser, served, errors):
+    return open_tab(browser, served[0], errors)
+
+
+@pytest.fixture(autouse=True)
+def no_console_errors(errors):
+    yield
+    assert errors == []
+
+
+def open_tab(browser, url, errors):
+    page = browser.new_page(viewport={"width": 900, "height": 600})
+    page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto(url)
+    page.locator(".edgel-pane", has_text="edge points shown").first.wait_for(timeout=1000 * TIMEOUT)
+    wait_for(lambda: count_pixels(page, EdgeKind.BOUNDARY) > 50, "the edges in the picture")
+    return page
+
+
+def test_slider_on_a_large_cloud(browser, folder, errors):
+    from edgel.view.server import running
+
+    path = folder / "large.ply"
+    edgel.write(path, synth.scan(synth.tee()).cloud)
+    with running([str(path)]) as (server, session, _):
+        page = open_tab(browser, f"http://127.0.0.1:{server.get_port()}", errors)
+        assert "647,984 points" in page.locator(".edgel-status").inner_text()
+        answer = session.panes()[0].answer
+        assert answer is not None
+        assert answer.edges is not None
+        strength = answer.edges.strength
+        assert shown(page) == (strength >= 0.5).sum()
+        before = picture(page)
+        type_number(page, "Strength ≥", 0.9)
+        wait_for(lambda: shown(page) == (strength >= 0.9).sum(), "fewer edges")
+        wait_for(lambda: (picture(page) != before).any(axis=2).sum() > 50, "another picture")
+        page.close()
+
+
+def test_kinds_are_switched(page):
+    all_edges = shown(page)
+    input_of(page, "boundary").click()
+    wait_for(lambda: shown(page) < all_edges, "the creases alone")
+    wait_for(lambda: count_pixels(page, EdgeKind.BOUNDARY) == 0, "no boundary in the picture")
+    assert count_pixels(page, EdgeKind.CREASE) > 0
+    input_of(page, "boundary").click()
+    wait_for(lambda: shown(page) == all_edges, "all edges")
+
+
+def test_saved_file_is_what_detect_answers(page, tee, tmp_path):
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Save edges").click()
+    download.value.save_as(tmp_path / "saved.ply")
+    cloud = edgel.read(tee)
+    edges = edgel.detect(cloud)
+    expected, saved = edges.take(edges.strength >= 0.5).cloud(cloud), edgel.read(tmp_path / "saved.ply")
+    np.testing.assert_array_equal(saved.xyz, expected.xyz)
+    assert set(saved.attributes) == set(expected.attributes)
+    for name, values in expected.attributes.items():
+        np.testing.assert_array_equal(saved.attributes[name], values, err_msg=name)
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Save picture").click()
+    assert download.value.suggested_filename == "tee_edges.png"
+
+
+def test_unreadable_file_says_why(page):
+    message = page.get_by_text("Cannot read <b>damaged.ply")
+    assert message.is_visible()
+    status = page.locator(".edgel-status").inner_text()
+    assert "Traceback" not in status
+    assert "points" in status.split("damaged", 2)[-1]  # the reader's own words: how many points are missing
+
+
+def test_click_shows_the_numbers(page):
+    blue = abs(picture(page) - KIND_COLORS[EdgeKind.BOUNDARY]).max(axis=2) < 12
+    rows, columns = np.nonzero(blue)
+    page.locator("canvas").last.click(position={"x": int(columns[0]), "y": int(rows[0])})
+    page.locator(".edgel-point", has_text="boundary").wait_for()
+    row = number_in(page.locator(".edgel-point").inner_text(), r"row\s+([\d,]+)")
+    assert 0 <= row < 40_000
+
+
+def test_published_method_beside_with_its_images(page, served):
+    choose(page, "Method", "side by side")
+    page.get_by_text("tee.ply: edge map").wait_for()
+    page.locator(".edgel-pane", has_text="paper").wait_for()
+    wait_for(lambda: count_pixels(page, EdgeKind.IMAGE) > 50, "the edges of the published method")
+    assert served[1].wait_idle(TIMEOUT)
+    assert count_pixels(page, EdgeKind.BOUNDARY) > 50
+    choose(page, "Method", "edgel")
+    wait_for(lambda: count_pixels(page, EdgeKind.IMAGE) == 0, "edgel's edges alone")
+
+
+def test_crop_and_colors(page):
+    before = shown(page)
+    page.get_by_text("Crop", exact=True).click()
+    thumb = page.locator("xpath=//label[text()='x (%)']/following::*[contains(@class, 'multi-slider-thumb')][2]")
+    thumb.hover()
+    box = thumb.bounding_box()
+    page.mouse.down()
+    page.mouse.move(box["x"] - 80, box["y"] + box["height"] / 2, steps=5)
+    page.mouse.up()
+    wait_for(lambda: shown(page) < before, "fewer edges")
+    assert "in_box" in page.locator(".edgel-code").inner_text()
+    page.get_by_role("button", name="Whole cloud").click()
+    wait_for(lambda: shown(page) == before, "all edges")
+    choose(page, "Color cloud by", "height")
+    wait_for(lambda: np.ptp(picture(page), axis=2).mean() > 20, "a colored cloud")
+    choose(page, "Color cloud by", "grey")
+
+
+def test_two_tabs_twenty_moves_and_a_tab_closed_meanwhile(page, browser, served, errors):
+    url, session = served
+    other = open_tab(browser, url, errors)
+    for step in range(20):
+        type_number(other, "Scale", 1.5 + 0.5 * (step % 10))
+    other.close()
+    wait_for(lambda: session.settings.scale == 6.0, "the last move")
+    assert session.wait_idle(TIMEOUT)
+    (pane,) = session.panes()
+    assert pane.is_current
+    wait_for(lambda: "at scale 6" in page.locator(".edgel-status").inner_text(), "the other tab to follow")
+    assert shown(page) == len(pane.edges)
+    type_number(page, "Scale", 1)
+    assert session.wait_idle(TIMEOUT)
+
+
+def test_pages_from_elsewhere_are_kept_out(served):
+    import viser
+    from websockets.exceptions import InvalidStatus
+    from websockets.sync.client import connect
+    from websockets.typing import Origin, Subprotocol
+
+    address = served[0].replace("http", "ws")
+    protocol = [Subprotocol(f"viser-v{viser.__version__}")]
+    with pytest.raises(InvalidStatus, match="403"):
+        connect(address, origin=Origin("http://example.com"), subprotocols=protocol)
+    connect(address, origin=Origin(served[0]), subprotocols=protocol).close()
