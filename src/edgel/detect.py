@@ -21,7 +21,7 @@ from edgel.viewing import METHODS, look
 
 PRESETS = ("default", "paper")
 DEFAULT_KINDS = EdgeKind.BOUNDARY | EdgeKind.OCCLUDING | EdgeKind.OCCLUDED | EdgeKind.CREASE
-EVEN = (0.4, 0.5)  # probability of an edge whose strength is a half: least, on the vaguest cloud, and most
+EVEN = (0.45, 0.5)  # probability of an edge whose strength is a half: least, on the vaguest cloud, and most
 COLOR = 0.2  # contrast of a color edge whose strength is a half
 
 
