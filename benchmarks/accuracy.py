@@ -68,6 +68,20 @@ def score(scene: Scene, mask: np.ndarray, kind: np.ndarray, finds: EdgeKind) -> 
     return row
 
 
+def ceiling(scene: Scene) -> dict[str, float]:
+    """Best F1 that any choice of points could have: that of all points within the tolerance of a true edge."""
+    strong = target(scene, ALL).strong
+    finite = np.isfinite(scene.cloud.xyz).all(axis=1) & ~scene.outlier
+    near = np.full(len(finite), np.inf)
+    near[finite] = _distance(scene.noise_free[finite], strong, np.zeros(int(finite.sum()), bool))
+    return {
+        f"f1@{tolerance}": _matched(scene, np.flatnonzero(near <= tolerance * scene.spacing), target(scene, ALL))[
+            f"f1@{tolerance}"
+        ]
+        for tolerance in TOLERANCES
+    }
+
+
 def _matched(scene: Scene, rows: np.ndarray, truth: Target) -> dict[str, float]:
     """Precision, recall and F1 at each tolerance; predictions that only a weak edge explains are left out."""
     placed, outlier = scene.noise_free[rows], scene.outlier[rows]

@@ -58,6 +58,7 @@ def main() -> None:
     results["published"] = published.published(truth) + published.measured(truth) if truth.is_dir() else []
     results["normals"] = normals.run()
     results["geometry"] = geometry.run()
+    results["wedges"] = geometry.wedges()
     if not options.no_speed:
         sizes = (10_000, 100_000) if options.quick else (10_000, 30_000, 100_000, 300_000, 647_984)
         slowest = 2.0 if options.quick else speed.SLOWEST
@@ -170,6 +171,7 @@ def _scene_rows(job: tuple[str, dict[str, dict[str, Any]]]) -> list[dict[str, An
         print(f"skipped: {name}: {error}", flush=True)
         return []
     rows = []
+    best = accuracy.ceiling(scene) if len(accuracy.target(scene, accuracy.ALL).strong) else None
     for rival in RIVALS:
         if rival.missing() is not None or (rival.organized_only and not scene.cloud.is_organized):
             continue
@@ -189,6 +191,7 @@ def _scene_rows(job: tuple[str, dict[str, dict[str, Any]]]) -> list[dict[str, An
                     "method": rival.name,
                     "variant": variant,
                     "seconds": found.seconds,
+                    "ceiling": best,
                 }
                 | accuracy.score(scene, found.mask, found.kind, rival.finds)
             )

@@ -71,6 +71,9 @@ def _page(results: dict[str, Any], rows: list[Row]) -> Iterable[str]:
     yield "![F1 against noise, single views](benchmarks/noise-views.png)"
     yield "## Whole surfaces (unorganized clouds)\n\nMean F1 at 1 spacing."
     yield _by_noise(rows, False, "f1@1.0")
+    if any(row.get("ceiling") for row in rows):
+        yield "Where points are strewn at random, or on lines 10 times as far apart as their steps, many a stretch of an edge has no point within a spacing. The mean F1 at 1 spacing of edgel's default beside the best that any choice of points could have:"
+        yield _ceilings(rows)
     yield "Mean F1 at 2.5 spacings."
     yield _by_noise(rows, False, "f1@2.5")
     yield "![F1 against noise, whole surfaces](benchmarks/noise-whole.png)"
@@ -88,6 +91,9 @@ def _page(results: dict[str, Any], rows: list[Row]) -> Iterable[str]:
     if results.get("geometry"):
         yield "## Geometry of creases\n\nMedian errors of edgel's creases (default) on scenes without noise: position in spacings; direction, the worse of both faces' normals, and the turn, in degrees; and for which share of the crease points they are known."
         yield _geometry(results["geometry"])
+    if results.get("wedges"):
+        yield "## Wedges\n\nShare of a wedge's edge that edgel's default finds, within 1 and within 2.5 spacings, by the angle it turns (degrees); no noise."
+        yield _wedges(results["wedges"])
     yield "## By the turn of the crease\n\nF1 at 1 spacing, all scenes of noise 0 without outliers, by the angle the surface turns (degrees)."
     yield _angles(rows)
     yield "![F1 against the turn of the crease](benchmarks/angle.png)"
@@ -121,6 +127,36 @@ def _geometry(rows: Sequence[Row]) -> str:
     return _table(
         ["scene", *figures], [middle, *([row["scene"], *(_cell(row[figure]) for figure in figures)] for row in rows)]
     )
+
+
+def _wedges(rows: Sequence[Row]) -> str:
+    turns = sorted({row["turn"] for row in rows})
+    at = {(row["seen"], row["turn"]): row for row in rows}
+    lines = [
+        [f"{seen}, {tolerance}", *(_cell(at[seen, turn][f"recall@{tolerance}"]) for turn in turns)]
+        for seen in dict.fromkeys(row["seen"] for row in rows)
+        for tolerance in ("1", "2.5")
+    ]
+    return _table(["view or pattern, spacings", *turns], lines)
+
+
+def _ceilings(rows: Sequence[Row]) -> str:
+    lines = []
+    for pattern in sorted({row["view"] for row in rows if not row["organized"]}):
+        line = [pattern]
+        for noise in NOISES:
+            picked = _pick(
+                rows,
+                "edgel default",
+                "defaults",
+                lambda r, n=noise, p=pattern: r["view"] == p and r["noise"] == n and r["outliers"] == 0 and "all" in r,
+            )
+            line += [
+                _cell(_mean(r["all"]["f1@1.0"] for r in picked)),
+                _cell(_mean(r["ceiling"]["f1@1.0"] for r in picked)),
+            ]
+        lines.append(line)
+    return _table(["pattern", *(f"{n}" for noise in NOISES for n in (f"noise {noise:g}", "best possible"))], lines)
 
 
 def _parameters(tuning: dict[str, Any]) -> str:

@@ -235,6 +235,26 @@ def nearest_points(pixels, depth, points):
     return shown
 
 
+def discs(columns, downs, distance, width, height, radius):
+    """Point that shows in each pixel when every point is a disc round the middle of its pixel: the nearest.
+
+    Points hidden in their own pixel have no disc. Of points as near, the lowest shows, then the rightmost.
+    """
+
+    def nearest(candidates):
+        return min(candidates, key=lambda p: (distance[p], -downs[p], -columns[p], p), default=-1)
+
+    pixel = [(math.floor(down), math.floor(column)) for down, column in zip(downs, columns, strict=True)]
+    every = range(len(pixel))
+    on_top = [p for p in every if nearest([q for q in every if pixel[q] == pixel[p]]) == p]
+    shown = np.empty((height, width), int)
+    for row in range(height):
+        for col in range(width):
+            over = [p for p in on_top if (pixel[p][0] - row) ** 2 + (pixel[p][1] - col) ** 2 <= radius**2]
+            shown[row, col] = nearest(over)
+    return shown
+
+
 def held(depth, close):
     """Pixels that at least 4 of their 24 neighbours hold: within `close`, or 3 median steps of the window more."""
     kept = np.full(depth.shape, np.nan)
@@ -381,3 +401,54 @@ def walk_trees(forest, row):
             node = node + 1 if row[forest.feature[node]] <= forest.threshold[node] else forest.right[node]
         total += float(forest.threshold[node])
     return 1 / (1 + np.exp(-total))
+
+
+def chains_kept(values, weak, least, threshold):
+    """Pixels of chains of 8-neighbours above weak * threshold that hold one of the threshold and `least` in all."""
+    above, kept = values >= weak * threshold, np.zeros(values.shape, bool)
+    seen = np.zeros(values.shape, bool)
+    for start in zip(*np.nonzero(above), strict=True):
+        if seen[start]:
+            continue
+        chain, waiting = [], [start]
+        seen[start] = True
+        while waiting:
+            row, col = waiting.pop()
+            chain.append((row, col))
+            for r in range(max(row - 1, 0), min(row + 2, values.shape[0])):
+                for c in range(max(col - 1, 0), min(col + 2, values.shape[1])):
+                    if above[r, c] and not seen[r, c]:
+                        seen[r, c] = True
+                        waiting.append((r, c))
+        if len(chain) >= least and max(values[at] for at in chain) >= threshold:
+            for at in chain:
+                kept[at] = True
+    return kept
+
+
+def two_planes_through(points, spanning, inlier, least_angle):
+    """The best supported plane through the origin (row 0) and the best that differs: their angle and support."""
+
+    def best(votes, other):
+        answer, most = None, 0.0
+        for i in range(1, spanning + 1):
+            for j in range(i + 1, spanning + 1):
+                normal = np.cross(points[i], points[j])
+                area = np.linalg.norm(normal)
+                if area <= 0.3:
+                    continue
+                normal = normal / area
+                if other is not None and abs(normal @ other) > math.cos(least_angle):
+                    continue
+                off = np.abs(votes @ normal)
+                score = (1 - 0.5 * off / inlier)[off < inlier].sum()
+                if score > most:
+                    answer, most = normal, score
+        return answer, most
+
+    a, first = best(points[1:], None)
+    if a is None:
+        return 0.0, 0.0, 0.0
+    rest = points[1:][np.abs(points[1:] @ a) >= inlier]
+    b, second = best(rest, a)
+    return (0.0 if b is None else math.acos(min(abs(a @ b), 1))), first, second

@@ -193,6 +193,23 @@ def test_detect_report(scan, tmp_path):
     assert run("detect", scan, "--report", "/proc/report").exit_code == 5
 
 
+def test_the_report_compares_the_presets_and_links_to_the_files(scan, tmp_path):
+    run("detect", scan, "-o", tmp_path / "edges.ply", "--report", tmp_path / "report")
+    page = (tmp_path / "report" / "report.html").read_text()
+    assert "Both presets" in page
+    assert 'href="../edges.ply"' in page
+    assert f'href="{os.path.relpath(scan, tmp_path / "report")}"' in page
+
+
+def test_a_report_of_what_the_paper_cannot_look_at_has_nothing_to_compare(tmp_path):
+    y, z = np.meshgrid(np.arange(30.0), np.arange(20.0))
+    io.write(tmp_path / "wall.ply", edgel.Cloud(np.c_[0 * y.ravel(), y.ravel(), z.ravel()]))
+    assert run("detect", tmp_path / "wall.ply", "--report", tmp_path / "report").exit_code == 0
+    page = (tmp_path / "report" / "report.html").read_text()
+    assert "of kind boundary" in page
+    assert "Both presets" not in page
+
+
 def test_a_cloud_that_is_all_edges_is_remarked(scan):
     assert "too sparse" in run("detect", scan, *PAPER).stderr
 
@@ -439,7 +456,7 @@ def test_demo(tmp_path):
 def test_no_command_shows_help():
     assert "detect" in run().output
     assert run("--version").stdout.startswith("edgel 0.")
-    for command in ("detect", "normals", "info", "convert", "demo"):
+    for command in ("detect", "normals", "info", "convert", "render", "demo"):
         page = run(command, "--help").stdout
         assert f"edgel {command}" in page
         assert "Examples:" in page

@@ -1,5 +1,6 @@
 """Evidence: each kernel against its slow oracle, the trees against a plain walk, and what `detect` makes of it."""
 
+import itertools
 import math
 
 import naive
@@ -9,11 +10,19 @@ import pytest
 import edgel
 from edgel import evidence, metrics, synth
 from edgel.edges import EdgeKind
-from edgel.evidence import FITS, sectors, sheets
+from edgel.evidence import FITS, coarse, context, scales, sectors, sheets, through
 from edgel.evidence.forest import Forest, evaluate
 from edgel.evidence.scales import SCALES, fit_scales
 from edgel.evidence.sectors import sector_gaps
 from edgel.evidence.sheets import fit_sheets
+from edgel.evidence.through import planes_through, span_planes
+from edgel.kdtree import build_index
+from edgel.neighbors import visit_neighbors
+
+
+def rows(vectors):
+    """Lay vectors out as the kernels want them, (3, k)."""
+    return np.ascontiguousarray(vectors.T)
 
 
 def neighbourhood(rng, count=96, noise=0.05, bend=0.6):
@@ -27,12 +36,12 @@ def neighbourhood(rng, count=96, noise=0.05, bend=0.6):
 @pytest.mark.parametrize("seed", range(5))
 def test_plane_fits_at_each_scale_match_numpy(seed):
     vectors = neighbourhood(np.random.default_rng(seed))
-    normals, features = np.zeros((len(SCALES), 4)), np.zeros(evidence.NUM_CHEAP)
-    fit_scales(vectors, (vectors**2).sum(axis=1), np.array(SCALES), normals, features)
+    normals, features = np.zeros((len(SCALES), 4)), np.zeros(scales.NUM_FEATURES)
+    fit_scales(rows(vectors), (vectors**2).sum(axis=1), np.array(SCALES), normals, features)
     for s, k in enumerate(SCALES):
         normal, variation, flatness = naive.covariance_plane(vectors[:k])
         assert abs(normals[s, :3] @ normal) == pytest.approx(1, abs=1e-9)
-        assert features[6 * s] == pytest.approx(math.log(variation + 1e-4), abs=1e-6)
+        assert features[6 * s] == pytest.approx(math.log(variation + 1e-6), abs=1e-6)
         assert features[6 * s + 1] == pytest.approx(flatness, abs=1e-9)
 
 
@@ -69,18 +78,16 @@ def test_two_planes_of_a_clean_roof_are_its_faces():
 
 
 def fitted(vectors, count):
-    normals, cheap = np.zeros((len(SCALES), 4)), np.zeros(evidence.NUM_CHEAP)
+    normals, cheap = np.zeros((len(SCALES), 4)), np.zeros(scales.NUM_FEATURES)
     squared = (vectors**2).sum(axis=1)
-    fit_scales(vectors, squared, np.array(SCALES), normals, cheap)
+    fit_scales(rows(vectors), squared, np.array(SCALES), normals, cheap)
     planes = np.tile(normals[0].astype(np.float32), (len(vectors), 1))
     for i in range(len(vectors)):  # the small plane of each neighbour
         near = np.argsort(((vectors - vectors[i]) ** 2).sum(axis=1))[:8]
         planes[i, :3], planes[i, 3] = naive.covariance_plane(vectors[near])[0], 1
     features, found = np.empty(sheets.NUM_FEATURES), np.empty(sheets.SHEETS)
-    side, best = np.empty(len(vectors), np.int64), np.empty(len(vectors), np.int64)
-    places = np.arange(len(vectors))
-    room, solve = np.empty((7, sheets.SHEETS)), np.empty((6, 7))
-    fit_sheets(vectors, places, squared, count, 1.0, planes, side, best, room, solve, features, found)
+    room = np.empty((12, sheets.SHEETS))
+    fit_sheets(rows(vectors), np.arange(len(vectors)), squared, count, 1.0, planes, room, features, found)
     return features, found
 
 
@@ -91,9 +98,72 @@ def test_sectors_match_the_naive_ones(seed):
     vectors = vectors[vectors[:, 0] > -0.5]
     squared = (vectors**2).sum(axis=1)
     normals, features = np.tile([0.0, 0.0, 1.0, 1.0], (3, 1)), np.empty(sectors.NUM_FEATURES)
-    sector_gaps(vectors, squared, normals, np.array(sectors.COUNTS), np.empty(len(vectors)), features)
+    begins, ends = np.empty((2, sectors.BINS))
+    sector_gaps(rows(vectors), squared, normals, np.array(sectors.COUNTS), begins, ends, features)
     for s, k in enumerate(sectors.COUNTS):
-        assert features[2 * s : 2 * s + 2] == pytest.approx(naive.two_widest_sectors(vectors[:k, :2]), abs=1e-9)
+        widest, second = naive.two_widest_sectors(vectors[:k, :2])
+        assert features[2 * s] == pytest.approx(widest, abs=1e-9)
+        assert features[2 * s + 1] == pytest.approx(second, abs=1e-9 if second > 4 * np.pi / sectors.BINS else 0.1)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(("count", "inlier"), through.FITS)
+def test_planes_through_the_point_match_the_naive_ones(seed, count, inlier):
+    vectors = neighbourhood(np.random.default_rng(seed), noise=0.02)
+    planes = np.empty((3, through.PLANES), np.float32)
+    off = np.zeros((through.VOTERS, through.PLANES), np.float32)
+    score, features = np.empty(through.PLANES, np.float32), np.empty(through.NUM_FEATURES)
+    span_planes(rows(vectors), 1.0, planes, off)
+    planes_through(rows(vectors), count, 1.0, inlier, math.cos(0.35), planes, off, score, features)
+    angle, first, second = naive.two_planes_through(vectors[:count], through.SPANNING, inlier, 0.35)
+    assert features[1] == pytest.approx(first, abs=1e-4)
+    assert features[2] == pytest.approx(second, abs=1e-4)
+    assert features[0] == pytest.approx(angle, abs=1e-3)
+
+
+def test_context_hears_the_neighbours_along_and_beside_the_edge():
+    """On a grid, one row of sure points: seen from it, sure ones lie ahead and behind and none beside."""
+    x, y = np.meshgrid(np.arange(21.0), np.arange(21.0))
+    index = build_index(np.column_stack([x.ravel(), y.ravel(), 0 * x.ravel()]))
+    chance = np.select([index.xyz[1] == 10, index.xyz[1] == 11], [0.9, 0.3]).astype(np.float32)
+    slot = np.full(len(index), -1, np.int32)
+    features = np.zeros((2, context.NUM_FEATURES), np.float32)
+    queries = build_index(np.array([[10.0, 10, 0], [10, 11, 0]]))
+    nowhere = np.zeros((1, 3), np.float32)
+    arguments = (chance, 0 * chance, slot, nowhere, nowhere, features)
+    visit_neighbors(context.look_around, queries, index, context.NEIGHBORS + 1, *arguments)
+    sure, faint = features
+    assert sure[[0, 3, 4, 5]] == pytest.approx([0.9, 0.9, 0.9, 0.3], abs=1e-6)  # itself, and the best of the 8 around
+    assert sure[6] == pytest.approx((2 * 0.9 + 3 * 0.3) / 8, abs=1e-6)
+    assert sure[[11, 12]] == pytest.approx([0.9, 0.9], abs=1e-6)
+    assert sure[13] == pytest.approx(0.6, abs=1e-6)  # surer than those beside
+    assert faint[13] == pytest.approx(-0.6, abs=1e-6)
+    assert sure[1] > 0.5
+
+
+def test_the_look_at_leaves_matches_numpy():
+    xyz = neighbourhood(np.random.default_rng(1), count=500)
+    index = build_index(xyz)
+    features, planes = coarse.look(index)
+    leaves = len(features)
+    limits = np.arange(leaves + 1) * len(xyz) // leaves
+    points = [index.xyz[:, a:b].T for a, b in itertools.pairwise(limits)]
+    middles = np.array([p.mean(axis=0) for p in points])
+    for leaf in range(leaves):
+        normal, variation, _ = naive.covariance_plane(points[leaf])
+        assert abs(planes[leaf, :3] @ normal) == pytest.approx(1, abs=1e-7)
+        assert planes[leaf, 3] == pytest.approx(math.exp(-variation / coarse.PLANAR), rel=1e-4)
+        nearest = np.argsort(((middles - middles[leaf]) ** 2).sum(axis=1))
+        size = math.sqrt(points[leaf].var(axis=0).sum())
+        for g, count in enumerate(coarse.GROUPS):
+            group = np.concatenate([points[i] for i in nearest[:count]])
+            normal, variation, _ = naive.covariance_plane(group)
+            aside = group.mean(axis=0) - middles[leaf]
+            off = aside @ normal
+            expected = [math.log(variation + 1e-6), abs(off) / size, math.sqrt(max(aside @ aside - off**2, 0)) / size]
+            assert features[leaf, 4 * g : 4 * g + 3] == pytest.approx(expected, abs=2e-3)
+            assert features[leaf, 4 * g + 3] == pytest.approx(math.sqrt(group.var(axis=0).sum()) / size, rel=1e-4)
+        assert features[leaf, -1] == len(points[leaf])
 
 
 def test_trees_match_a_plain_walk():
@@ -111,9 +181,12 @@ def test_trees_match_a_plain_walk():
 
 def test_the_package_has_trees_for_its_features():
     for name, count in (
-        ("crease", evidence.NUM_COSTLY),
-        ("outline", evidence.NUM_COSTLY),
+        ("coarse", coarse.NUM_FEATURES + evidence.NUM_CLOUD),
         ("screen", evidence.NUM_CHEAP),
+        ("first crease", evidence.NUM_COSTLY),
+        ("first outline", evidence.NUM_COSTLY),
+        ("crease", evidence.NUM_ALL),
+        ("outline", evidence.NUM_ALL),
     ):
         forest = evidence.forests()[name]
         assert 0 < forest.feature.max() < count

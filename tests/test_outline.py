@@ -6,7 +6,7 @@ import pytest
 
 from edgel.edges import EdgeKind
 from edgel.facets import _held, local_planes, noise_level
-from edgel.outline import beside_void, level_gaps, outline_kinds
+from edgel.outline import Outline, beside_void, level_gaps, outline_kinds
 from edgel.raster import Raster, organized, orthographic
 
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -22,7 +22,10 @@ def heights(z):
 
 
 def found(xyz):
-    return outline_kinds(orthographic(xyz, DOWN), xyz)
+    """What counts by default: strength of a half or more."""
+    outline = outline_kinds(orthographic(xyz, DOWN), xyz)
+    sure = outline.strength >= 0.5
+    return Outline(np.where(sure, outline.kind, 0), np.where(sure, outline.strength, 0))
 
 
 def stair(noise=0.0, height=10.0):
@@ -146,7 +149,7 @@ def test_kernels_equal_naive():
     kept = np.full(depth.shape, np.nan)
     _held(0, len(depth), depth, close, kept)
     assert np.array_equal(kept, naive.held(depth, close), equal_nan=True)
-    planes = local_planes(depth, np.full(depth.shape, 0.2), False, 3)
+    planes = local_planes(depth, np.full(depth.shape, 0.2), np.ones(depth.shape, bool), False, 3)
     for row, col in np.argwhere(~np.isnan(depth)):
         assert planes[row, col, :4] == pytest.approx(naive.facet(depth, 0.2, row, col, 3), abs=1e-9)
     hole = RNG.random((40, 50)) < 0.7

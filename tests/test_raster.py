@@ -7,7 +7,7 @@ import pytest
 from edgel import Cloud
 from edgel.cloud import check_points
 from edgel.raster import _nearest, image_pitch, organized, orthographic, pinhole, spherical
-from edgel.viewing import choose_method
+from edgel.viewing import choose_method, count_rings
 
 DOWN = np.array([0.0, 0.0, -1.0])
 
@@ -154,3 +154,32 @@ def test_choice_of_a_view(cloud, method):
     chosen = choose_method(cloud, cloud.xyz)
     assert chosen.method == method
     assert "\n" not in chosen.reason
+
+
+def sweep(levels=16, empty=0):
+    """What a spinning sensor at the origin sees of a room, `empty` shots without an echo among it."""
+    azimuth, elevation = np.meshgrid(np.arange(0, 2 * np.pi, 0.005), np.radians(np.linspace(-15, 15, levels)))
+    rays = np.stack([np.cos(azimuth), np.sin(azimuth), np.tan(elevation)], axis=-1).reshape(-1, 3)
+    room = rays * (4 / np.abs(rays[:, :2]).max(axis=1, keepdims=True))
+    return np.concatenate([room, np.zeros((empty, 3))])
+
+
+@pytest.mark.parametrize("empty", [0, 500])
+def test_a_spinning_sensor_is_known_by_its_rings(empty):
+    xyz = sweep(empty=empty)
+    viewing = choose_method(Cloud(xyz), xyz)
+    assert viewing.method == "spherical"
+    assert "16 rings" in viewing.reason
+    assert viewing.raster is not None
+    shown = viewing.raster.index[viewing.raster.index >= 0]
+    assert np.isin(np.arange(len(xyz) - empty), shown).mean() > 0.99
+    assert not np.isin(np.arange(len(xyz) - empty, len(xyz)), shown).any()
+
+
+def test_no_rings_where_there_are_none():
+    rng = np.random.default_rng(1)
+    assert count_rings(rng.standard_normal((20000, 3))) == 0
+    assert count_rings(grid(200, 200).reshape(-1, 3) + (1.0, 1.0, 5.0)) == 0
+    assert count_rings(sweep()[:500]) == 0  # too few to tell
+    flat = np.column_stack([rng.uniform(-50, 50, (20000, 2)), 0.1 * rng.standard_normal(20000)])
+    assert count_rings(np.concatenate([flat, rng.uniform(-60, 60, (200, 3))])) == 0  # outliers all round are no rings

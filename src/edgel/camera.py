@@ -44,10 +44,11 @@ class Camera:
         The first two columns count right and up, in the cloud's unit or, in perspective, per unit of distance (NaN
         behind the eye); the third grows away from the viewer, in the cloud's unit.
         """
-        axes = np.column_stack([self.right, self.up, -self.back])
+        x, y, z = (xyz if self.eye is None else xyz - self.eye).T
+        # No matrix product: its rounding may depend on where in the array a point stands.
+        placed = np.column_stack([x * a + y * b + z * c for a, b, c in (self.right, self.up, -self.back)])
         if self.eye is None:
-            return xyz @ axes
-        placed = (xyz - self.eye) @ axes
+            return placed
         ahead = np.where(placed[:, 2] > 0, placed[:, 2], np.nan)
         return np.column_stack([placed[:, 0] / ahead, placed[:, 1] / ahead, ahead])
 
@@ -138,6 +139,31 @@ def choose_frame(placed: np.ndarray, size: tuple[int, int], *, margin: float, cr
     width, height = np.minimum(np.ceil(extent / pixel + 2 * rim), size).astype(int) if crop else size
     left, top = (low + high) / 2 + np.array([-width, height]) * pixel / 2
     return Frame(int(width), int(height), float(left), float(top), pixel)
+
+
+def detail_frame(camera: Camera, place: Any, extent: float, size: tuple[int, int]) -> Frame:
+    """Frame the surroundings of a place.
+
+    Parameters
+    ----------
+    camera : Camera
+    place : (3,) array_like
+        What is in the middle of the picture, in the cloud's frame.
+    extent : float
+        Width of the picture at that place, in the cloud's unit.
+    size : (int, int)
+        Width and height, in pixels.
+
+    Raises
+    ------
+    ValueError
+        If the place lies behind the viewer, or there is no width.
+    """
+    x, y, distance = camera.place(as_vector(place, "detail")[None])[0]
+    if not extent > 0 or np.isnan(x):
+        raise ValueError(f"detail: expected a place before the viewer and a width above 0, got {place!r}, {extent!r}")
+    pixel = float(extent) / size[0] / (1.0 if camera.eye is None else distance)
+    return Frame(size[0], size[1], x - pixel * size[0] / 2, y + pixel * size[1] / 2, pixel)
 
 
 def _looking(away: np.ndarray, down: np.ndarray | None = None, eye: np.ndarray | None = None) -> Camera:

@@ -11,7 +11,7 @@ from edgel import paper
 from edgel.cloud import as_cloud, as_vector, check_points
 from edgel.color import color_channels, color_edges
 from edgel.edges import EdgeKind, Edges, as_kinds
-from edgel.evidence import crease_probability, examine, outline_probability, screen, survey
+from edgel.evidence import judge, survey
 from edgel.evidence.faces import faces
 from edgel.kdtree import build_index
 from edgel.normals import check_num_neighbors, plane_fits, towards
@@ -21,8 +21,8 @@ from edgel.viewing import METHODS, look
 
 PRESETS = ("default", "paper")
 DEFAULT_KINDS = EdgeKind.BOUNDARY | EdgeKind.OCCLUDING | EdgeKind.OCCLUDED | EdgeKind.CREASE
-CREASE = 0.45  # least probability of a crease
-OUTLINE = 0.5  # least probability that the surface ends
+EVEN = (0.4, 0.5)  # probability of an edge whose strength is a half: least, on the vaguest cloud, and most
+COLOR = 0.2  # contrast of a color edge whose strength is a half
 
 
 def detect(
@@ -31,6 +31,7 @@ def detect(
     preset: Literal["default", "paper"] = "default",
     kinds: EdgeKind | str | Iterable[str] = DEFAULT_KINDS,
     method: Literal["auto", "surface", "organized", "orthographic", "pinhole", "spherical"] = "auto",
+    min_strength: float = 0.5,
     num_neighbors: int = 16,
     viewpoint: Any = None,
     progress: Callable[[str], None] | None = None,
@@ -52,6 +53,9 @@ def detect(
     method : {"auto", "surface", "organized", "orthographic", "pinhole", "spherical"}
         The way to look at the cloud: on the surface itself, from any side; along the rows and columns of an organized
         cloud; or in a projection of that kind. "auto" chooses, and `Edges.method` and `Edges.reason` say what and why.
+    min_strength : float
+        Least `Edges.strength` of the points returned, in (0, 1]; one half, on any cloud, is where an edge is as likely
+        as not. Lower finds fainter edges and more that are none. "paper" has thresholds of its own.
     num_neighbors : int
         k of the plane fits that give the normals, the point itself among them; at least 3.
     viewpoint : (3,) array_like, optional
@@ -91,9 +95,13 @@ def detect(
             raise ValueError("kinds: the paper tells no kinds of edge apart; leave it out, or use the default preset")
         if method != "auto":
             raise ValueError("method: the paper has its own, along Z; leave it out, or use the default preset")
+        if min_strength != 0.5:
+            raise ValueError("min_strength: the paper has thresholds of its own, see edgel.paper.detect; leave it out")
         if viewpoint is not None:
             raise ValueError("viewpoint: the paper turns normals by D > 0; leave it out, or use the default preset")
         return paper.detect(points, num_neighbors=num_neighbors, progress=progress)
+    if not 0 < min_strength <= 1:
+        raise ValueError(f"min_strength: expected a number above 0 and at most 1, got {min_strength}")
     cloud = as_cloud(points)
     viewpoint = cloud.viewpoint if viewpoint is None else as_vector(viewpoint, "viewpoint")
     checked = check_points(cloud)
@@ -103,40 +111,37 @@ def detect(
     k = check_num_neighbors(num_neighbors, len(checked.xyz))
 
     stages = Stages(progress)
-    found = Marks(len(checked.xyz))
+    found = Marks(len(checked.xyz), min_strength)
     with stages("index"):
         index = build_index(checked.xyz)
     with stages("survey"):
         surveyed = survey(index)
         if not surveyed.has_surface:
             raise ValueError("points: all lie on one line or spot, so there is no surface whose edges could be found")
-        rows = screen(index, surveyed)
     with stages("view"):
         viewing = look(cloud, checked.xyz, checked.rows, method, viewpoint)
     with stages("evidence"):
-        evidence = examine(index, surveyed, checked.xyz[rows])
+        verdict = judge(index, surveyed)
     with stages("decision"):
-        sure = crease_probability(evidence)
-        found.mark(rows, EdgeKind.CREASE, np.where(sure >= CREASE, sure, 0))
+        found.mark(verdict.rows, EdgeKind.CREASE, strength(verdict.crease))
         if viewing.raster is None:
-            ends = outline_probability(evidence)
-            found.mark(rows, EdgeKind.BOUNDARY, np.where(ends >= OUTLINE, ends, 0))
+            found.mark(verdict.rows, EdgeKind.BOUNDARY, strength(verdict.outline))
         else:
             outline = outline_kinds(viewing.raster, checked.xyz)
             found.mark(np.arange(len(checked.xyz)), outline.kind, outline.strength)
     if EdgeKind.COLOR in kinds and channels is not None:
         with stages("color"):
-            contrast = color_edges(
-                index, checked.xyz, surveyed.normals_in_order(index), channels[checked.rows]
-            ).strength
-            found.mark(np.arange(len(checked.xyz)), EdgeKind.COLOR, contrast)
+            normals = surveyed.normals_in_order(index)
+            contrast = color_edges(index, checked.xyz, normals, channels[checked.rows]).strength
+            found.mark(np.arange(len(checked.xyz)), EdgeKind.COLOR, color_strength(contrast))
     with stages("faces"):
         edge = np.flatnonzero(found.kind & int(kinds))
         at = checked.xyz[edge]
         planes = towards(plane_fits(index, at, k), at, viewpoint)
-        crease = np.flatnonzero(sure >= CREASE)
-        sides = faces(evidence.take(crease), checked.xyz[rows[crease]], viewpoint).spread(
-            edge, rows[crease], at, planes.normals
+        creased = np.flatnonzero(found.kind[verdict.rows] & EdgeKind.CREASE & int(kinds))
+        rows = verdict.rows[creased]
+        sides = faces(verdict.evidence.take(creased), checked.xyz[rows], viewpoint).spread(
+            edge, rows, at, planes.normals
         )
     return Edges(
         index=checked.rows[edge],
@@ -152,19 +157,38 @@ def detect(
         preset=preset,
         method=viewing.method,
         reason=viewing.reason,
-        parameters={"num_neighbors": k},
+        parameters={"min_strength": min_strength, "num_neighbors": k},
         seconds=stages.seconds,
     )
+
+
+def strength(probability: np.ndarray) -> np.ndarray:
+    """Turn the probabilities of one kind into strengths, so that one half is the best place to draw the line.
+
+    The expected F1 is greatest at half of it (Lipton et al. 2014, doi:10.1007/978-3-662-44851-9_15): near one half
+    where edges are plain, lower where noise leaves none of them sure. Odds keep their ratio.
+    """
+    falling = np.sort(probability)[::-1]
+    expected = np.cumsum(falling) / (np.arange(1, len(falling) + 1) + falling.sum())
+    even = min(max(float(expected.max(initial=0.0)), EVEN[0]), EVEN[1])
+    return probability * (1 - even) / (probability * (1 - even) + even * (1 - probability))
+
+
+def color_strength(contrast: np.ndarray) -> np.ndarray:
+    """Turn contrasts into strengths, a sure edge's threshold to one half; its fainter parts have that too."""
+    return np.where(contrast > 0, np.maximum(contrast / (contrast + COLOR), 0.5), 0)
 
 
 class Marks:
     """The edge points found so far: kinds (N,) uint8 and strength (N,) of the most marked kind."""
 
-    def __init__(self, count: int) -> None:
+    def __init__(self, count: int, least: float) -> None:
         self.kind = np.zeros(count, np.uint8)
         self.strength = np.zeros(count)
+        self.least = least
 
     def mark(self, rows: np.ndarray, kind: EdgeKind | np.ndarray, strength: np.ndarray) -> None:
-        """Add a kind (one, or (M,) flags) at rows (M,) whose strength (M,) is above 0."""
-        self.kind[rows] |= np.where(strength > 0, kind, 0).astype(np.uint8)
-        self.strength[rows] = np.maximum(self.strength[rows], strength)
+        """Add a kind (one, or (M,) flags) at rows (M,) whose strength (M,) is the least wanted or more."""
+        enough = strength >= self.least
+        self.kind[rows] |= np.where(enough, kind, 0).astype(np.uint8)
+        self.strength[rows] = np.maximum(self.strength[rows], np.where(enough, strength, 0))

@@ -155,6 +155,39 @@ class Edges:
         """
         return self._describe(as_cloud(points), self.index)
 
+    def plot(self, axes: Any = None, *, points: Any = None) -> Any:
+        """Scatter the edge points by kind in Matplotlib `axes` (3D unless given) and return them.
+
+        In 2D axes x and y are drawn. `points` are drawn in grey behind; `edgel.plot.picture` hides what they hide.
+        """
+        from edgel import export  # it lies above: drawing knows edges, finding them knows no drawing
+
+        return export.draw(self, axes, points)
+
+    def to_open3d(self) -> Any:
+        """Return an Open3D point cloud of `position`, with the first normal and the color of the kind."""
+        from edgel import export
+
+        return export.to_open3d(self)
+
+    def to_pyvista(self) -> Any:
+        """Return a PyVista mesh of `position`, with ``index``, ``rgb`` of the kind, and the columns of `cloud`."""
+        from edgel import export
+
+        return export.to_pyvista(self)
+
+    def to_dataframe(self) -> Any:
+        """Return a pandas table, one row an edge point: its ``index`` and the columns of `cloud`."""
+        from edgel import export
+
+        return export.to_dataframe(self)
+
+    def _repr_html_(self) -> str:
+        """Return what notebooks show."""
+        from edgel import export
+
+        return export.as_html(self)
+
     def _describe(self, cloud: Cloud, rows: np.ndarray) -> Cloud:
         kind, convex = np.zeros(len(cloud), np.uint8), np.zeros(len(cloud), np.int8)
         strength, angle = np.zeros(len(cloud), np.float32), np.full(len(cloud), np.nan, np.float32)

@@ -57,14 +57,14 @@ def without_lonely(depth: np.ndarray, spacing: np.ndarray, noise: np.ndarray) ->
     return kept
 
 
-def local_planes(depth: np.ndarray, noise: np.ndarray, perspective: bool, reach: int) -> np.ndarray:
-    """Fit a plane to each pixel's own side of whatever edge is near.
+def local_planes(depth: np.ndarray, noise: np.ndarray, wanted: np.ndarray, perspective: bool, reach: int) -> np.ndarray:
+    """Fit a plane to each wanted pixel's own side of whatever edge is near.
 
     Returns
     -------
     (H, W, 5) float64
         Depth of the plane at the pixel, its slopes down and right (per pixel), the variance of that depth, and how far
-        noise may take the pixel's own depth from it.
+        noise may take the pixel's own depth from it; NaN where not wanted.
     """
     around = np.arange(-reach, reach + 1)
     dr, dc = (part.ravel() for part in np.meshgrid(around, around, indexing="ij"))
@@ -72,7 +72,7 @@ def local_planes(depth: np.ndarray, noise: np.ndarray, perspective: bool, reach:
     dr, dc = dr[inside], dc[inside]
     sector = np.floor((np.arctan2(dr, dc) / (2 * np.pi) * SECTORS + 1e-9) % SECTORS).astype(np.int64)
     planes = np.full((*depth.shape, 5), np.nan)
-    run_slices(_planes, len(depth), depth, noise, perspective, dr, dc, sector, planes, size=16)
+    run_slices(_planes, len(depth), depth, noise, wanted, perspective, dr, dc, sector, planes, size=16)
     return planes
 
 
@@ -132,13 +132,13 @@ def _fit(m):
 
 
 @kernel
-def _planes(start, stop, depth, noise, perspective, dr, dc, sector, planes):
+def _planes(start, stop, depth, noise, wanted, perspective, dr, dc, sector, planes):
     height, width = depth.shape
     sums, m = np.zeros((2 * SECTORS + 1, 10)), np.zeros(10)
     for row in range(start, stop):
         for col in range(width):
             own = depth[row, col]
-            if math.isnan(own):
+            if math.isnan(own) or not wanted[row, col]:
                 continue
             sums[:] = 0.0
             for i in range(len(dr)):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel.canny import hysteresis
+from edgel.chains import levels
 from edgel.edges import EdgeKind
 from edgel.facets import local_planes, noise_level, without_lonely
 from edgel.parallel import kernel, run_slices
@@ -16,6 +16,7 @@ from edgel.raster import Raster
 STEP = 2.0  # spacings: least break of the surface between two pixels
 LEVELS = 3.0  # and least break in levels to which the sensor rounds depths
 GAP = 2.0  # spacings: least difference of their depths
+LEAST_GAP = 0.6  # spacings: where neighbours' depths differ by less, even a faint step is ruled out
 SURE = 6.0  # standard deviations by which a break exceeds what noise explains
 WEAK = 2 / 3  # of all that, where a break continues a sure one
 CHAIN = 4  # times the reach of the windows, in pixels: chains of both sides that are shorter are specks
@@ -34,7 +35,7 @@ class Outline:
     kind : (N,) uint8
         `EdgeKind` flags BOUNDARY, OCCLUDING, OCCLUDED of each point.
     strength : (N,) float64
-        In (0, 1] where there is a flag, else 0.
+        In (0, 1] where there is a flag, else 0; one half where a break just counts.
     """
 
     kind: np.ndarray
@@ -73,15 +74,20 @@ def outline_kinds(raster: Raster, xyz: np.ndarray) -> Outline:
     known = ~np.isnan(spacing)
     level = float(np.median(noise[known] / spacing[known])) if known.any() else 0.0
     reach = 3 if level < 0.15 else 4 if level < 0.5 else 5
-    planes = local_planes(depth, noise, perspective, reach)
+    wanted = beside_gap(depth, LEAST_GAP * spacing)
+    planes = local_planes(depth, noise, wanted, perspective, reach)
     astray = np.abs(raster.depth - planes[..., 0]) > planes[..., 4] + STRAY * spacing
     depth = np.where(astray, np.nan, depth)
-    planes = local_planes(depth, noise, perspective, reach)
+    touched = astray
+    for _ in range(2 * reach):  # as far as any window reaches
+        touched = _widened(touched)
+    again = touched & beside_gap(depth, LEAST_GAP * spacing)
+    planes[again] = local_planes(depth, noise, again, perspective, reach)[again]
     least = np.maximum(STEP * spacing, LEVELS * _by_pixel(raster, level_gaps(xyz, raster.direction)))
     step, side = depth_steps(depth, planes, spacing, least, perspective)
-    broken = without_specks(hysteresis(step, WEAK, 1.0), CHAIN * reach)
-    kind = np.where(broken, side, 0) | np.where(rim, EdgeKind.BOUNDARY, 0)
-    strength = np.where(rim, 1.0, np.where(broken, step / (1 + step), 0.0))
+    level = levels(step, WEAK, CHAIN * reach)
+    kind = np.where(level > 0, side, 0) | np.where(rim, EdgeKind.BOUNDARY, 0)
+    strength = np.where(rim, 1.0, level / (1 + level))
     shown = raster.index >= 0
     flags, strengths = np.zeros(len(xyz), np.uint8), np.zeros(len(xyz))
     flags[raster.index[shown]], strengths[raster.index[shown]] = kind[shown], strength[shown]
@@ -126,11 +132,15 @@ def depth_steps(
     return step, side
 
 
-def without_specks(edges: np.ndarray, least: int) -> np.ndarray:
-    """Drop chains (of 8-neighbours) of fewer than `least` pixels."""
-    kept = np.zeros(edges.shape, np.bool_)
-    _long_chains(np.pad(edges, 1), least, kept)
-    return kept
+def beside_gap(depth: np.ndarray, least: np.ndarray) -> np.ndarray:
+    """Pixels beside a hole, or beside a depth that differs by `least` (H, W) or more; (H, W) bool."""
+    wanted = np.zeros(depth.shape, bool)
+    for axis in (0, 1):
+        first, second, own = (np.moveaxis(image, axis, 0) for image in (depth, least, wanted))
+        apart = ~(np.abs(np.diff(first, axis=0)) < np.fmin(second[:-1], second[1:]))
+        own[:-1] |= apart
+        own[1:] |= apart
+    return wanted & ~np.isnan(depth)
 
 
 def beside_void(depth: np.ndarray) -> np.ndarray:
@@ -198,27 +208,3 @@ def _steps(start, stop, depth, planes, spacing, least, perspective, step, side):
                 if sure > step[row, col]:
                     step[row, col] = sure
                     side[row, col] = 2 if gap > 0 else 4
-
-
-@kernel
-def _long_chains(padded, least, kept):
-    """Copy the chains of at least `least` pixels; `padded` is emptied."""
-    width = padded.shape[1]
-    flat, chain = padded.ravel(), np.empty(padded.size, np.int64)
-    for first in range(flat.size):
-        if not flat[first]:
-            continue
-        flat[first] = False
-        chain[0], done, count = first, 0, 1
-        while done < count:
-            for r in range(-1, 2):
-                for c in range(-1, 2):
-                    place = chain[done] + r * width + c
-                    if flat[place]:
-                        flat[place] = False
-                        chain[count] = place
-                        count += 1
-            done += 1
-        if count >= least:
-            for i in range(count):
-                kept[chain[i] // width - 1, chain[i] % width - 1] = True

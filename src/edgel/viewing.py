@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +15,11 @@ METHODS = ("auto", "surface", "organized", "orthographic", "pinhole", "spherical
 SHOWN = 0.97  # least share of the points that one view has to show
 DEPTH = 3.0  # spacings behind the nearest point of its pixel within which a point still shows
 _CAMERA = 0.5  # least cosine to the mean ray in the view of a camera
+_RINGS = (8, 256)  # how many lasers a spinning sensor has
+_RING_SHOTS = 100  # least mean number of shots of each
+_ON_RINGS = 0.95  # least share of the shots that lie on them
+_GAP = 5e-4  # of the range of elevations: least gap between rings
+_SHARP = 0.3  # of the gap between two rings: most that a ring is thick
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,20 +69,61 @@ def choose_method(cloud: Cloud, xyz: np.ndarray, viewpoint: np.ndarray | None = 
     if viewpoint is not None:
         rays = xyz - viewpoint
         away = np.linalg.norm(rays, axis=1)
-        if away.min() > 0:
-            middle = rays.mean(axis=0)
-            camera = (rays @ middle >= _CAMERA * away * np.linalg.norm(middle)).all() and middle.any()
-            # A spinning sensor may see a narrow sector too: its lines lie farther apart than its shots.
-            raster = spherical(xyz, viewpoint)
-            if camera and raster.pitch[0] == raster.pitch[1]:
-                raster = pinhole(xyz, viewpoint)
-            share = shown(raster, xyz)
-            if share >= SHOWN:
-                return Viewing(raster.method, f"{share:.0%} of the points show from the viewpoint", raster)
-        else:
-            share = 0.0
+        middle = rays.mean(axis=0)
+        camera = (rays @ middle >= _CAMERA * away * np.linalg.norm(middle)).all() and middle.any()
+        # A spinning sensor may see a narrow sector too: its lines lie farther apart than its shots.
+        raster = _from_viewpoint(spherical, xyz, viewpoint)
+        if camera and raster.pitch[0] == raster.pitch[1] and away.min() > 0:
+            raster = pinhole(xyz, viewpoint)
+        share = shown(raster)
+        if share >= SHOWN:
+            return Viewing(raster.method, f"{share:.0%} of the points show from the viewpoint", raster)
         return Viewing("surface", f"only {share:.0%} of the points show from the viewpoint")
+    if (rings := count_rings(xyz)) > 0:
+        reason = f"the points lie on {rings} rings about the origin, as those of a spinning sensor there"
+        return Viewing("spherical", reason, _from_viewpoint(spherical, xyz, np.zeros(3)))
     return Viewing("surface", "the points form no grid and the sensor's place is not known")
+
+
+def count_rings(xyz: np.ndarray) -> int:
+    """Count the lasers of a spinning sensor at the origin, its axis +Z; 0 where the elevations of points show none.
+
+    Parameters
+    ----------
+    xyz : (N, 3) float64
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> azimuth, elevation = np.meshgrid(np.arange(0, 6.28, 0.01), np.radians(np.arange(-15, 16, 2)))
+    >>> rays = np.stack([np.cos(azimuth), np.sin(azimuth), np.tan(elevation)], axis=-1).reshape(-1, 3)
+    >>> count_rings(rays * (5 + np.sin(rays[:, :1] * 9)))
+    16
+    """
+    level = np.hypot(xyz[:, 0], xyz[:, 1])
+    away = level + np.abs(xyz[:, 2]) > 0
+    elevation = np.sort(np.arctan2(xyz[away, 2], level[away]))
+    if len(elevation) < _RINGS[0] * _RING_SHOTS:
+        return 0
+    parted = np.flatnonzero(np.diff(elevation) > _GAP * (elevation[-1] - elevation[0]))
+    first, last = np.append(0, parted + 1), np.append(parted, len(elevation) - 1)
+    full = last - first + 1 >= _RING_SHOTS
+    first, last = first[full], last[full]
+    if not _RINGS[0] <= len(first) <= _RINGS[1] or (last - first + 1).sum() < _ON_RINGS * len(elevation):
+        return 0
+    thick, apart = elevation[last] - elevation[first], elevation[first[1:]] - elevation[last[:-1]]
+    return len(first) if np.median(thick) < _SHARP * np.median(apart) else 0
+
+
+def _from_viewpoint(project: Callable[..., Raster], xyz: np.ndarray, viewpoint: np.ndarray) -> Raster:
+    """Project the points; those in the viewpoint itself (sensors report shots without an echo so) do not show."""
+    rows = np.flatnonzero((xyz != viewpoint).any(axis=1))
+    if len(rows) == len(xyz):
+        return project(xyz, viewpoint)
+    raster = project(xyz[rows], viewpoint)
+    behind = np.zeros(len(xyz))
+    behind[rows] = raster.behind
+    return replace(raster, index=np.where(raster.index >= 0, rows[raster.index], -1), behind=behind)
 
 
 def look(cloud: Cloud, xyz: np.ndarray, rows: np.ndarray, method: str, viewpoint: np.ndarray | None) -> Viewing:
@@ -110,7 +157,7 @@ def look(cloud: Cloud, xyz: np.ndarray, rows: np.ndarray, method: str, viewpoint
     else:
         if viewpoint is None:
             raise ValueError(f"method: {method!r} needs to know where the sensor was; give viewpoint, or use 'auto'")
-        raster = (pinhole if viewing.method == "pinhole" else spherical)(xyz, viewpoint)
+        raster = _from_viewpoint(pinhole if viewing.method == "pinhole" else spherical, xyz, viewpoint)
     return Viewing(viewing.method, viewing.reason, raster)
 
 
@@ -121,13 +168,13 @@ def _best_direction(xyz: np.ndarray, viewpoint: np.ndarray | None) -> tuple[Rast
         if viewpoint is not None and direction @ (xyz.mean(axis=0) - viewpoint) < 0:
             direction = -direction
         raster = orthographic(xyz, direction)
-        share = shown(raster, xyz)
+        share = shown(raster)
         if share > most + 1e-3:  # earlier candidates, the view from above first, win a draw
             best, most = raster, share
     return best, most
 
 
-def shown(raster: Raster, xyz: np.ndarray) -> float:
+def shown(raster: Raster) -> float:
     """Share of the points that lie in the layer nearest to the viewer."""
     return float(np.mean(raster.behind <= DEPTH))
 

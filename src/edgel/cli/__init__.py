@@ -1,4 +1,4 @@
-"""The command line: ``edgel detect``, ``view``, ``normals``, ``info``, ``convert`` and ``demo``."""
+"""The command line: ``edgel detect``, ``view``, ``render``, ``normals``, ``info``, ``convert`` and ``demo``."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from edgel.cli import convert, demo, detect, info, normals, view
+from edgel.cli import convert, demo, detect, info, normals, render, view
 from edgel.cli.options import help_text
 
 _HELP = """Find the edges of 3D point clouds, and their normals, without tuning.
@@ -15,6 +15,7 @@ _HELP = """Find the edges of 3D point clouds, and their normals, without tuning.
 \b
   edgel info scan.ply                   what the file holds
   edgel detect scan.ply -o edges.ply    its edge points, with kind and normal
+  edgel render scan.ply -o edges.png    a picture of it with its edges
   edgel view scan.ply                   look at them in the browser
   edgel demo                            two pipe fittings, with a report
 
@@ -54,4 +55,5 @@ app.command(help=help_text(view.HELP), epilog=_EPILOG)(view.view)
 app.command(help=help_text(normals.HELP), epilog=_EPILOG)(normals.normals)
 app.command(help=help_text(info.HELP), epilog=_EPILOG)(info.info)
 app.command(help=help_text(convert.HELP), epilog=_EPILOG)(convert.convert)
+app.command(help=help_text(render.HELP), epilog=_EPILOG)(render.render)
 app.command(help=help_text(demo.HELP), epilog=_EPILOG)(demo.demo)

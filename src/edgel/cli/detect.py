@@ -16,7 +16,7 @@ from edgel.cli.errors import ExitCode, Failure, as_option, exit_codes, failing_a
 from edgel.cli.output import count, print_json, print_line, print_table, seconds
 from edgel.cli.progress import Watch
 from edgel.detect import PRESETS
-from edgel.edges import ASKABLE, EdgeKind, Edges, as_kinds, kind_names
+from edgel.edges import EdgeKind, Edges, as_kinds
 from edgel.stages import Stages
 from edgel.viewing import METHODS
 
@@ -41,7 +41,7 @@ Examples:
 
 _SUSPICIOUS_SHARE = 0.5  # of edge points; CAD models sampled with known edges have 2 to 13 %
 
-_FUNCTIONS = {"default": edgel.detect, "paper": edgel.paper.detect}
+FUNCTIONS = {"default": edgel.detect, "paper": edgel.paper.detect}
 
 
 def detect(
@@ -50,33 +50,22 @@ def detect(
         str | None,
         typer.Option("-o", "--output", metavar="OUT", help="The cloud to write; - writes PLY to stdout."),
     ] = None,
-    preset: Annotated[
-        str, typer.Option(metavar="|".join(PRESETS), help="The method: edgel's own, or the published one.")
-    ] = options.default_of(edgel.detect, "preset"),
-    kinds: Annotated[
-        str | None,
-        options.option(
-            edgel.detect,
-            "kinds",
-            f"Kinds of edge to look for, commas between: {', '.join(kind_names(ASKABLE))}.",
-            metavar="NAMES",
-        ),
-    ] = None,
-    method: Annotated[
-        str | None,
-        options.option(
-            edgel.detect,
-            "method",
-            f"How to look at the cloud: {', '.join(METHODS[:-1])} or {METHODS[-1]}. Surface takes any cloud, from any "
-            "side; organized goes along its rows and columns; the last three look at a projection; auto chooses.",
-            metavar="NAME",
-        ),
-    ] = None,
+    preset: options.Preset = options.PRESET,
+    kinds: options.Kinds = None,
+    method: options.Method = None,
     label_all: Annotated[
         bool, typer.Option("--all", help="Write the whole cloud, labelled; edge_kind is 0 where there is no edge.")
     ] = False,
     report: Annotated[
         str | None, typer.Option(metavar="DIR", help="Write a report with figures into this folder.")
+    ] = None,
+    min_strength: Annotated[
+        float | None,
+        options.option(
+            edgel.detect,
+            "min_strength",
+            "Least strength of an edge point, 0 to 1: at 0.5 it is as likely an edge as not; lower finds fainter ones.",
+        ),
     ] = None,
     num_neighbors: Annotated[
         int | None, options.option(edgel.detect, "num_neighbors", "Neighbours of each plane fit, the point among them.")
@@ -102,6 +91,7 @@ def detect(
     given = {
         "kinds": kinds,
         "method": method,
+        "min_strength": min_strength,
         "num_neighbors": num_neighbors,
         "viewpoint": viewpoint,
         "width": width,
@@ -123,14 +113,14 @@ def detect(
             with stages("reading"):
                 cloud = files.read_cloud(source, intrinsics)
             with failing_as(ExitCode.DATA, source, arguments(preset)):
-                edges = _FUNCTIONS[preset](cloud, **given, progress=watch)
+                edges = FUNCTIONS[preset](cloud, **given, progress=watch)
             stages.seconds.update(edges.seconds)
             if output is not None:
                 with stages("writing"):
                     files.write_cloud(output, edges.label(cloud) if label_all else edges.cloud(cloud))
             if report is not None:
                 with stages("report"):
-                    page = report_on(source, cloud, edges, report)
+                    page = report_on(source, output, cloud, edges, report)
         if as_json:
             print_json(collect(source, output, page, edges, stages.seconds))
             return
@@ -168,7 +158,7 @@ def check_options(preset: str, given: dict[str, Any]) -> dict[str, Any]:
 
 def arguments(preset: str) -> set[str]:
     """Return the names of the arguments that a preset has beside the points."""
-    return set(inspect.signature(_FUNCTIONS[preset]).parameters) - {"points"}
+    return set(inspect.signature(FUNCTIONS[preset]).parameters) - {"points"}
 
 
 def check_outputs(output: str | None, report: str | None, *, label_all: bool, as_json: bool) -> None:
@@ -183,13 +173,21 @@ def check_outputs(output: str | None, report: str | None, *, label_all: bool, as
         files.check_new_folder(report)
 
 
-def report_on(source: str, cloud: edgel.Cloud, edges: Edges, directory: str) -> Path:
-    """Write the report of one cloud and return its page."""
+def report_on(source: str, output: str | None, cloud: edgel.Cloud, edges: Edges, directory: str) -> Path:
+    """Write the report of one cloud, compared with what the other preset finds in it, and return its page."""
     from edgel.report import Case, write_report  # not at the top: Matplotlib takes time to import
 
     name = "stdin" if source == files.PIPE else Path(source).stem
+    (preset,) = set(PRESETS) - {edges.preset}
+    try:
+        other = edgel.detect(cloud, preset=preset)
+    except ValueError:  # what one preset can look at is too little for the other: nothing to compare
+        other = None
+    beside = {"the cloud": source, "what was written": output}
+    beside = {what: path for what, path in beside.items() if path not in (None, files.PIPE)}
     with failing_as(ExitCode.OUTPUT, directory):
-        return write_report([Case(name, cloud, edges)], directory, title=f"Edges of {name}")
+        case = Case(name, cloud, edges, other=other, files=beside)
+        return write_report([case], directory, title=f"Edges of {name}")
 
 
 def creases(edges: Edges) -> dict[str, Any]:

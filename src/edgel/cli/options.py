@@ -10,7 +10,9 @@ import typer
 
 import edgel
 from edgel.cli.errors import as_option
-from edgel.edges import EdgeKind, kind_names
+from edgel.detect import PRESETS
+from edgel.edges import ASKABLE, EdgeKind, kind_names
+from edgel.viewing import METHODS
 
 PAPER = "The published method (--preset paper)"
 
@@ -83,3 +85,26 @@ def help_text(text: str) -> str:
 def paper_option(name: str, text: str) -> Any:
     """Make an option of the published method."""
     return option(edgel.paper.detect, name, text, panel=PAPER)
+
+
+Preset = Annotated[str, typer.Option(metavar="|".join(PRESETS), help="The method: edgel's own, or the published one.")]
+PRESET = default_of(edgel.detect, "preset")
+Kinds = Annotated[
+    str | None,
+    option(
+        edgel.detect,
+        "kinds",
+        f"Kinds of edge to look for, commas between: {', '.join(kind_names(ASKABLE))}.",
+        metavar="NAMES",
+    ),
+]
+Method = Annotated[
+    str | None,
+    option(
+        edgel.detect,
+        "method",
+        f"How to look at the cloud: {', '.join(METHODS[:-1])} or {METHODS[-1]}. Surface takes any cloud, from any "
+        "side; organized goes along its rows and columns; the last three look at a projection; auto chooses.",
+        metavar="NAME",
+    ),
+]

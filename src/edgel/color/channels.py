@@ -6,6 +6,7 @@ import numpy as np
 
 from edgel.cloud import Cloud
 
+_RGB = ("red", "green", "blue")
 _INTENSITY = ("intensity", "scalar_intensity", "reflectance", "reflectivity")
 _PERCENTILES = (1.0, 99.0)  # of the intensity, which has no range of its own: a few glints must not decide
 
@@ -37,26 +38,52 @@ def color_channels(cloud: Cloud) -> np.ndarray | None:
     array([[0. , 0.5, 0.5],
            [1. , 0.5, 0.5]])
     """
-    columns = {name.lower(): values for name, values in cloud.attributes.items() if values.ndim == 1}
-    seen = np.isfinite(cloud.xyz).all(axis=1)
-    if all(name in columns for name in ("red", "green", "blue")):
-        rgb = np.column_stack([columns[name] for name in ("red", "green", "blue")]).astype(np.float64)
-        rgb[~np.isfinite(rgb).all(axis=1)] = np.nan
-        known = rgb[seen & ~np.isnan(rgb[:, 0])]
-        if len(known) and (np.ptp(known, axis=0) > 0).any():
-            r, g, b = np.clip(rgb / _full_range(columns["red"].dtype, known.max()), 0.0, 1.0).T
-            return np.column_stack([(r + g + b) / 3, (r - b) / 2 + 0.5, (2 * g - r - b) / 4 + 0.5])
+    rgb = rgb_of(cloud)
+    if rgb is not None and (np.ptp(rgb[_known(cloud, rgb)], axis=0) > 0).any():
+        r, g, b = rgb.T
+        return np.column_stack([(r + g + b) / 3, (r - b) / 2 + 0.5, (2 * g - r - b) / 4 + 0.5])
+    intensity = intensity_of(cloud)
+    return None if intensity is None else intensity[:, None]
+
+
+def rgb_of(cloud: Cloud) -> np.ndarray | None:
+    """Return red, green and blue (N, 3) in [0, 1], NaN where not finite; None when the cloud carries none."""
+    columns = _columns(cloud)
+    if not all(name in columns for name in _RGB):
+        return None
+    rgb = np.column_stack([columns[name] for name in _RGB]).astype(np.float64)
+    rgb[~np.isfinite(rgb).all(axis=1)] = np.nan
+    known = rgb[_known(cloud, rgb)]
+    return np.clip(rgb / _full_range(columns["red"].dtype, known.max()), 0.0, 1.0) if len(known) else None
+
+
+def intensity_of(cloud: Cloud) -> np.ndarray | None:
+    """Return the intensity (N,) in [0, 1], its 1st percentile 0 and its 99th 1, NaN where not finite.
+
+    None when the cloud carries none, or one value everywhere.
+    """
+    columns = _columns(cloud)
     for name in _INTENSITY:
         if name in columns:
             values = columns[name].astype(np.float64)
             values[~np.isfinite(values)] = np.nan
-            known = values[seen & ~np.isnan(values)]
+            known = values[_known(cloud, values)]
             if len(known) and np.ptp(known) > 0:
                 low, high = np.percentile(known, _PERCENTILES)
                 if low == high:
                     low, high = known.min(), known.max()
-                return np.clip((values - low) / (high - low), 0.0, 1.0)[:, None]
+                return np.clip((values - low) / (high - low), 0.0, 1.0)
     return None
+
+
+def _columns(cloud: Cloud) -> dict[str, np.ndarray]:
+    return {name.lower(): values for name, values in cloud.attributes.items() if values.ndim == 1}
+
+
+def _known(cloud: Cloud, values: np.ndarray) -> np.ndarray:
+    """Points (N,) bool with finite coordinates and a value."""
+    known = ~np.isnan(values if values.ndim == 1 else values[:, 0])
+    return known & np.isfinite(cloud.xyz).all(axis=1)
 
 
 def _full_range(kind: np.dtype, largest: float) -> float:

@@ -13,6 +13,7 @@ from edgel import paper, plot, synth
 from edgel.demo.measure import NUM_NEIGHBORS, Measurement, Times, measure_times
 from edgel.demo.tables import REACH, count_table, findings, normals_table, offset_table, time_table, truth_table
 from edgel.demo.truth import found_lengths, offsets
+from edgel.detect import detect
 from edgel.io import write
 from edgel.report import Case, Table, make_directory, write_report
 
@@ -83,6 +84,8 @@ def run_demo(
     paper.detect(scans[0].cloud, num_neighbors=NUM_NEIGHBORS)  # so that the report's times hold no compilation
     found = [paper.detect(scan.cloud, num_neighbors=NUM_NEIGHBORS) for scan in scans]
     times = measure_times(scans, found, repeats, tell)
+    tell("comparing with the default preset")
+    others = [detect(scan.cloud) for scan in scans]
     tell("comparing with the truth")
     measurements = tuple(
         Measurement(scan, edges, spent, found_lengths(scan, edges, reach=REACH), offsets(scan, edges))
@@ -94,9 +97,12 @@ def run_demo(
     files = [path for one in measurements for path in _write_clouds(folder, one)]
     tell("drawing")
     plot.save(folder / "edges.png", side_by_side(measurements))
-    cases = [Case(one.name, one.scan.cloud, one.edges, one.scan.part) for one in measurements]
+    cases = [
+        Case(one.name, one.scan.cloud, one.edges, one.scan.part, other=other)
+        for one, other in zip(measurements, others, strict=True)
+    ]
     page = write_report(cases, folder, title="Edges of a tee and an elbow", findings=said, tables=tables)
-    figures = [folder / f"{one.name}-figure-{number}.png" for one in measurements for number in (1, 3, 4, 5)]
+    figures = [folder / f"{one.name}-figure-{number}.png" for one in measurements for number in (1, 3, 4, 5, 8, 9)]
     return Demo(measurements, tables, said, page, (page, folder / "edges.png", *figures, *files))
 
 

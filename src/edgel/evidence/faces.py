@@ -7,11 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel.evidence import FITS, Evidence
-
-_MAX_AWAY = 1.5  # spacings: a line farther from the point is not its edge
-_MIN_TURN = math.radians(12.0)
-_FLOOR = 0.02  # spacings: residuals below it do not make one fit better than another
+from edgel.evidence import MIN_TURN, Evidence
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,20 +54,15 @@ class Faces:
 
 
 def faces(evidence: Evidence, xyz: np.ndarray, viewpoint: np.ndarray | None) -> Faces:
-    """Choose for each point (M, 3) the fit that places its edge best, and describe the edge by it.
+    """Describe the edge at each point (M, 3) by the fit that places it best (`Evidence.fit`).
 
-    The error of a line fitted to K points falls with the residual over the root of K: small fits win at curved and
-    crowded edges, large ones under noise. Normals are turned towards the viewpoint, or upwards (+Z) without one.
+    Normals are turned towards the viewpoint, or upwards (+Z) without one.
     """
-    found = evidence.sheets.astype(np.float64)
-    a, b, line, foot, middle_a, middle_b = (found[:, :, i : i + 3] for i in (0, 3, 6, 9, 14, 17))
+    found = evidence.fit.astype(np.float64)
+    a, b, line, foot, middle_a, middle_b = (found[:, i : i + 3] for i in (0, 3, 6, 9, 14, 17))
     wing_a, wing_b = _wing(middle_a - foot, line), _wing(middle_b - foot, line)
-    turn = math.pi - np.arccos(np.clip((wing_a * wing_b).sum(axis=2), -1, 1))
-    error = (evidence.residuals + _FLOOR) / np.sqrt([count for count, _ in FITS])
-    error[(evidence.away > _MAX_AWAY) | ~(turn > _MIN_TURN)] = np.inf
-    rows, best = np.arange(len(found)), error.argmin(axis=1)
-    known = np.isfinite(error[rows, best])
-    a, b, line, foot, wing_a, wing_b = (part[rows, best] for part in (a, b, line, foot, wing_a, wing_b))
+    turn = math.pi - np.arccos(np.clip((wing_a * wing_b).sum(axis=1), -1, 1))
+    known = evidence.placed & (turn > MIN_TURN)
     # Turned so that each normal points away from the other face's wing, both lie on the outside of the wedge.
     a, b = _away_from(a, wing_b), _away_from(b, wing_a)
     out = a + b
@@ -89,15 +80,15 @@ def faces(evidence: Evidence, xyz: np.ndarray, viewpoint: np.ndarray | None) -> 
         position=xyz + foot * unknown,
         direction=line * unknown,
         normals=np.stack([a, b], axis=1) * (sign[:, None] * unknown)[:, None],
-        angle=turn[rows, best] * unknown[:, 0],
+        angle=turn * unknown[:, 0],
         convex=np.where(known, sign, 0).astype(np.int8),
     )
 
 
 def _wing(into: np.ndarray, line: np.ndarray) -> np.ndarray:
     """Unit vectors from the line into a face."""
-    across = into - (into * line).sum(axis=2, keepdims=True) * line
-    length = np.linalg.norm(across, axis=2, keepdims=True)
+    across = into - (into * line).sum(axis=1, keepdims=True) * line
+    length = np.linalg.norm(across, axis=1, keepdims=True)
     return across / np.where(length > 0, length, np.nan)
 
 

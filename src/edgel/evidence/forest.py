@@ -48,12 +48,18 @@ def evaluate(forest: Forest, features: np.ndarray) -> np.ndarray:
 
 
 @kernel
+def probability(row, roots, feature, threshold, right):
+    """Return the probability that trees, laid out as in `Forest`, give one row of features."""
+    total = 0.0
+    for root in roots:
+        node = root
+        while feature[node] >= 0:
+            node = node + 1 if row[feature[node]] <= threshold[node] else right[node]
+        total += threshold[node]
+    return 1.0 / (1.0 + math.exp(-total))
+
+
+@kernel
 def _evaluate(start, stop, roots, feature, threshold, right, features, result):
     for row in range(start, stop):
-        total = 0.0
-        for root in roots:
-            node = root
-            while feature[node] >= 0:
-                node = node + 1 if features[row, feature[node]] <= threshold[node] else right[node]
-            total += threshold[node]
-        result[row] = 1.0 / (1.0 + math.exp(-total))
+        result[row] = probability(features[row], roots, feature, threshold, right)

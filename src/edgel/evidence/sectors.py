@@ -6,40 +6,57 @@ import math
 
 import numpy as np
 
-from edgel.evidence.sheets import tangent
+from edgel.evidence.quadric import tangent
 from edgel.parallel import kernel
 
 COUNTS = (16, 32, 96)
 NUM_FEATURES = 2 * len(COUNTS)
+BINS = 64
+"""Sectors the angles are sorted into: empty ones narrower than this share of the circle are of no interest."""
 
 
 @kernel
-def sector_gaps(vectors, squared, normals, counts, angles, features):
+def sector_gaps(vectors, squared, normals, counts, first, last, features):
     """Write the widest empty sector of the tangent plane and the second widest, for each number of neighbours.
 
-    The tangent plane of the smallest number is that of the middle scale (S, 4), of the others that of the largest.
+    Takes the neighbours (3, k) relative to the point, nearest first. The tangent plane of the smallest number is that
+    of the middle scale (S, 4), of the others that of the largest. `first` and `last` (BINS,) are room.
     """
     for s in range(len(counts)):
         normal = normals[min(s + 1, len(normals) - 1)]
         nx, ny, nz = normal[0], normal[1], normal[2]
         ux, uy, uz = tangent(nx, ny, nz)
         vx, vy, vz = ny * uz - nz * uy, nz * ux - nx * uz, nx * uy - ny * ux
-        seen = 0
-        for i in range(min(counts[s], vectors.shape[0])):
+        first[:] = np.inf
+        last[:] = -np.inf
+        for i in range(min(counts[s], vectors.shape[1])):
             if squared[i] > 0.0:
-                x = vectors[i, 0] * ux + vectors[i, 1] * uy + vectors[i, 2] * uz
-                y = vectors[i, 0] * vx + vectors[i, 1] * vy + vectors[i, 2] * vz
-                angles[seen] = math.atan2(y, x)
-                seen += 1
+                x = vectors[0, i] * ux + vectors[1, i] * uy + vectors[2, i] * uz
+                y = vectors[0, i] * vx + vectors[1, i] * vy + vectors[2, i] * vz
+                angle = math.atan2(y, x)
+                place = min(int((angle + math.pi) * (BINS / (2.0 * math.pi))), BINS - 1)
+                first[place] = min(first[place], angle)
+                last[place] = max(last[place], angle)
         widest, second = 2.0 * math.pi, 0.0
-        if seen > 0:
-            ordered = np.sort(angles[:seen])
-            widest = 2.0 * math.pi - (ordered[seen - 1] - ordered[0])
-            for i in range(1, seen):
-                gap = ordered[i] - ordered[i - 1]
-                if gap > widest:
-                    widest, second = gap, widest
-                elif gap > second:
-                    second = gap
+        begin, end = np.inf, -np.inf
+        gap_widest, gap_second = 0.0, 0.0
+        for place in range(BINS):
+            if last[place] == -np.inf:
+                continue
+            if begin == np.inf:
+                begin = first[place]
+            else:
+                gap = first[place] - end
+                if gap > gap_widest:
+                    gap_widest, gap_second = gap, gap_widest
+                elif gap > gap_second:
+                    gap_second = gap
+            end = last[place]
+        if begin < np.inf:
+            gap = 2.0 * math.pi - (end - begin)
+            if gap > gap_widest:
+                widest, second = gap, gap_widest
+            else:
+                widest, second = gap_widest, max(gap, gap_second)
         features[2 * s] = widest
         features[2 * s + 1] = second

@@ -9,43 +9,50 @@ import math
 
 import numpy as np
 
+from edgel.evidence.quadric import fit_quadric, tangent
 from edgel.normals import smallest_eigenpair
-from edgel.parallel import kernel
+from edgel.parallel import kernel, summing_kernel
 
 ROUNDS = 3
 NUM_FEATURES = 13
-SHEETS = 20  # numbers that describe two planes: see `fit_sheets`
+SHEETS = 24  # numbers that describe two planes: see `fit_sheets`
+_MARGIN_NEIGHBORS = 16
 
 
-@kernel
-def _plane_of(vectors, count, side, want, plane):
-    """Fit a plane to the neighbours whose `side` is `want`; returns their number and the sum of squares left.
-
-    `plane` (6,) becomes normal and centroid.
-    """
-    mx, my, mz, n = 0.0, 0.0, 0.0, 0
+@summing_kernel
+def moments(vectors, count, px, py, pz, level, sums):
+    """Sum 1, x, y, z, xx, xy, xz, yy, yz, zz over the neighbours beyond a plane into `sums` (10,)."""
+    xs, ys, zs = vectors[0], vectors[1], vectors[2]
+    n, mx, my, mz = 0.0, 0.0, 0.0, 0.0
     xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(count):
-        if side[i] == want:
-            dx, dy, dz = vectors[i, 0], vectors[i, 1], vectors[i, 2]
-            mx, my, mz, n = mx + dx, my + dy, mz + dz, n + 1
-            xx, xy, xz = xx + dx * dx, xy + dx * dy, xz + dx * dz
-            yy, yz, zz = yy + dy * dy, yz + dy * dz, zz + dz * dz
-    if n < 3:
-        return n, 0.0
-    mx, my, mz = mx / n, my / n, mz / n
-    smallest, _, nx, ny, nz = smallest_eigenpair(
-        xx - n * mx * mx, xy - n * mx * my, xz - n * mx * mz, yy - n * my * my, yz - n * my * mz, zz - n * mz * mz
-    )
-    plane[0], plane[1], plane[2], plane[3], plane[4], plane[5] = nx, ny, nz, mx, my, mz
-    return n, max(smallest, 0.0)
+        x, y, z = xs[i], ys[i], zs[i]
+        w = 1.0 if px * x + py * y + pz * z > level else 0.0
+        n, mx, my, mz = n + w, mx + w * x, my + w * y, mz + w * z
+        xx, xy, xz = xx + w * x * x, xy + w * x * y, xz + w * x * z
+        yy, yz, zz = yy + w * y * y, yz + w * y * z, zz + w * z * z
+    sums[0], sums[1], sums[2], sums[3], sums[4] = n, mx, my, mz, xx
+    sums[5], sums[6], sums[7], sums[8], sums[9] = xy, xz, yy, yz, zz
 
 
 @kernel
-def _bisect(vectors, count, a, b, side, sheets):
-    """Part the neighbours by the plane that bisects planes a and b; false where these are parallel.
+def plane_of(s, plane):
+    """Fit a plane to points of moments `s` (10,): normal and centroid into `plane` (6,); returns the squares left."""
+    n = s[0]
+    mx, my, mz = s[1] / n, s[2] / n, s[3] / n
+    smallest, _, nx, ny, nz = smallest_eigenpair(
+        s[4] - s[1] * mx, s[5] - s[1] * my, s[6] - s[1] * mz, s[7] - s[2] * my, s[8] - s[2] * mz, s[9] - s[3] * mz
+    )
+    plane[0], plane[1], plane[2], plane[3], plane[4], plane[5] = nx, ny, nz, mx, my, mz
+    return max(smallest, 0.0)
 
-    Writes the line's direction and its point nearest to the origin to `sheets` [6:12].
+
+@kernel
+def _bisect(a, b, line):
+    """Find where planes a and b (6,) meet, and the plane that parts their centroids; false where they are parallel.
+
+    Writes to `line` (10,): the line's direction, its point nearest to the origin, and the parting plane's normal and
+    level.
     """
     dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
     tx, ty, tz = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
@@ -57,54 +64,55 @@ def _bisect(vectors, count, a, b, side, sheets):
     u, v = (da - db * dot) / sine2, (db - da * dot) / sine2
     fx, fy, fz = u * a[0] + v * b[0], u * a[1] + v * b[1], u * a[2] + v * b[2]
     length = math.sqrt(sine2)
-    sheets[6], sheets[7], sheets[8] = tx / length, ty / length, tz / length
-    sheets[9], sheets[10], sheets[11] = fx, fy, fz
+    line[0], line[1], line[2] = tx / length, ty / length, tz / length
+    line[3], line[4], line[5] = fx, fy, fz
     # Of the two bisecting planes, the one that parts the centroids.
     px, py, pz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
     qx, qy, qz = a[0] + b[0], a[1] + b[1], a[2] + b[2]
     cx, cy, cz = a[3] - b[3], a[4] - b[4], a[5] - b[5]
     p, q = px * cx + py * cy + pz * cz, qx * cx + qy * cy + qz * cz
-    p2, q2 = px * px + py * py + pz * pz, qx * qx + qy * qy + qz * qz
-    if p * p * q2 < q * q * p2:
+    if p * p * (qx * qx + qy * qy + qz * qz) < q * q * (px * px + py * py + pz * pz):
         px, py, pz, p = qx, qy, qz, q
     if p < 0.0:
         px, py, pz = -px, -py, -pz
-    level = px * fx + py * fy + pz * fz
-    for i in range(count):
-        across = px * vectors[i, 0] + py * vectors[i, 1] + pz * vectors[i, 2] - level
-        side[i] = 0 if across > 0.0 else 1
+    line[6], line[7], line[8], line[9] = px, py, pz, px * fx + py * fy + pz * fz
     return True
 
 
 @kernel
-def _refine(vectors, count, side, sheets, room):
-    """Fit, part, fit again; returns the squares left in all, infinite where a side runs out of neighbours."""
-    a, b = room[0], room[1]
+def _refine(vectors, count, whole, start, sheets, room):
+    """Part by a plane `start` (4,), fit, part again; returns the squares left, infinite where a side is too small.
+
+    `whole` (10,) are the moments of all; `room` is (5, 10).
+    """
+    one, other, a, b, line = room[0], room[1], room[2], room[3], room[4]
+    px, py, pz, level = start[0], start[1], start[2], start[3]
     best = np.inf
     for _turn in range(ROUNDS):
-        n_a, left_a = _plane_of(vectors, count, side, 0, a)
-        n_b, left_b = _plane_of(vectors, count, side, 1, b)
-        if n_a < 4 or n_b < 4:
+        moments(vectors, count, px, py, pz, level, one)
+        for i in range(10):
+            other[i] = whole[i] - one[i]
+        if one[0] < 4.0 or other[0] < 4.0:
             break
-        if left_a + left_b < best:
-            if _bisect(vectors, count, a, b, side, room[2]):
-                best = left_a + left_b
-                sheets[0:3] = a[0:3]
-                sheets[3:6] = b[0:3]
-                sheets[6:12] = room[2, 6:12]
-                sheets[12], sheets[13] = n_a, n_b
-                sheets[14:17] = a[3:6]
-                sheets[17:20] = b[3:6]
-            else:
-                break
-        elif not _bisect(vectors, count, a, b, side, room[2]):
+        left = plane_of(one, a) + plane_of(other, b)
+        if not left < best or not _bisect(a, b, line):
             break
+        settled = left > 0.999 * best
+        best = left
+        sheets[0:3], sheets[3:6] = a[0:3], b[0:3]
+        sheets[6:12] = line[0:6]
+        sheets[12], sheets[13] = one[0], other[0]
+        sheets[14:17], sheets[17:20] = a[3:6], b[3:6]
+        sheets[20:24] = line[6:10]
+        if settled:
+            break
+        px, py, pz, level = line[6], line[7], line[8], line[9]
     return best
 
 
 @kernel
-def _part_by_curvature(vectors, count, normal, quadric, side):
-    """Part the neighbours by the plane through the point across the direction in which the quadric bends most."""
+def _across_bend(normal, quadric, start):
+    """Put the plane through the point across the direction in which the quadric bends most into `start` (4,)."""
     nx, ny, nz = normal[0], normal[1], normal[2]
     ux, uy, uz = tangent(nx, ny, nz)
     vx, vy, vz = ny * uz - nz * uy, nz * ux - nx * uz, nx * uy - ny * ux
@@ -114,130 +122,116 @@ def _part_by_curvature(vectors, count, normal, quadric, side):
     across = quadric[3] * s * s - quadric[4] * c * s + quadric[5] * c * c
     if abs(across) > abs(along):
         c, s = -s, c
-    dx, dy, dz = c * ux + s * vx, c * uy + s * vy, c * uz + s * vz
-    for i in range(count):
-        side[i] = 0 if dx * vectors[i, 0] + dy * vectors[i, 1] + dz * vectors[i, 2] > 0.0 else 1
+    start[0], start[1], start[2], start[3] = c * ux + s * vx, c * uy + s * vy, c * uz + s * vz, 0.0
 
 
 @kernel
-def tangent(nx, ny, nz):
-    """Return a unit vector across a unit normal."""
-    if abs(nx) <= abs(ny) and abs(nx) <= abs(nz):
-        x, y, z = 0.0, nz, -ny
-    elif abs(ny) <= abs(nz):
-        x, y, z = -nz, 0.0, nx
-    else:
-        x, y, z = ny, -nx, 0.0
-    length = math.sqrt(x * x + y * y + z * z)
-    if length == 0.0:
-        return 1.0, 0.0, 0.0
-    return x / length, y / length, z / length
-
-
-@kernel
-def _part_by_normals(places, squared, count, normals, side_planes, reach2):
-    """Choose the two neighbours' planes that differ most, near and flat ones first; false where all are alike."""
-    a, best = -1, -1.0
+def _most_different(places, squared, count, normals):
+    """Choose the two neighbours whose planes differ most, near and flat ones first; -1 where all are alike."""
+    reach2 = squared[count - 1]
+    a, best = 0, -1.0
     for i in range(count):
-        score = normals[places[i], 3] * math.exp(-squared[i] / (0.5 * reach2))
+        score = normals[places[i], 3] * _nearness(2.0 * squared[i] / reach2)
         if score > best:
             a, best = i, score
-    pa = places[a]
-    b, best = -1, 0.0
+    ax, ay, az = normals[places[a], 0], normals[places[a], 1], normals[places[a], 2]
+    b, best = -1, 1e-6
     for i in range(count):
         p = places[i]
-        cosine = abs(normals[p, 0] * normals[pa, 0] + normals[p, 1] * normals[pa, 1] + normals[p, 2] * normals[pa, 2])
-        score = normals[p, 3] * (1.0 - cosine) * math.exp(-squared[i] / reach2)
+        cosine = abs(normals[p, 0] * ax + normals[p, 1] * ay + normals[p, 2] * az)
+        score = normals[p, 3] * (1.0 - cosine) * _nearness(squared[i] / reach2)
         if score > best:
             b, best = i, score
-    side_planes[0], side_planes[1] = a, b
-    return b >= 0 and best > 1e-6
+    return a, b
 
 
 @kernel
-def _quadric(vectors, count, normal, radius, room, quadric):
-    """Fit z = f0 + f1 x + f2 y + f3 x^2 + f4 x y + f5 y^2 over the tangent plane; returns the squares left.
+def _nearness(far2):
+    """Fall off like a Gaussian of the distance: 1, 0.4, 0.14 at squares 0, 1, 2."""
+    return 1.0 / (1.0 + far2 * (1.0 + 0.5 * far2 * (1.0 + far2 / 3.0)))
 
-    Lengths in radii. Solved by Cholesky with a little on the diagonal, so that what is open is small.
-    """
-    nx, ny, nz = normal[0], normal[1], normal[2]
-    ux, uy, uz = tangent(nx, ny, nz)
-    vx, vy, vz = ny * uz - nz * uy, nz * ux - nx * uz, nx * uy - ny * ux
-    terms = np.empty(6)
-    room[:, :] = 0.0
-    total = 0.0
+
+@kernel
+def _of_neighbor(normals, place, vectors, i, plane):
+    for axis in range(3):
+        plane[axis], plane[3 + axis] = normals[place, axis], vectors[axis, i]
+
+
+@summing_kernel
+def _reaches(vectors, count, sheets, near):
+    """How near the line those on either side come, squared, how far they reach, and how far along it: `near` (6,)."""
+    tx, ty, tz, fx, fy, fz = sheets[6], sheets[7], sheets[8], sheets[9], sheets[10], sheets[11]
+    px, py, pz, level = sheets[20], sheets[21], sheets[22], sheets[23]
+    xs, ys, zs = vectors[0], vectors[1], vectors[2]
+    near_a, near_b, far_a, far_b, low, high = 1e300, 1e300, 0.0, 0.0, 0.0, 0.0
+    beside2 = near[0]
     for i in range(count):
-        x = (vectors[i, 0] * ux + vectors[i, 1] * uy + vectors[i, 2] * uz) / radius
-        y = (vectors[i, 0] * vx + vectors[i, 1] * vy + vectors[i, 2] * vz) / radius
-        z = (vectors[i, 0] * nx + vectors[i, 1] * ny + vectors[i, 2] * nz) / radius
-        terms[0], terms[1], terms[2], terms[3], terms[4], terms[5] = 1.0, x, y, x * x, x * y, y * y
-        total += z * z
-        for j in range(6):
-            for k in range(j, 6):
-                room[j, k] += terms[j] * terms[k]
-            room[j, 6] += terms[j] * z
-    dot = 0.0
-    for i in range(6):
-        room[i, i] += 1e-4
-    for i in range(6):
-        pivot = room[i, i]
-        for k in range(i):
-            pivot -= room[k, i] * room[k, i]
-        pivot = math.sqrt(max(pivot, 1e-12))
-        room[i, i] = pivot
-        for j in range(i + 1, 7):
-            value = room[i, j]
-            for k in range(i):
-                value -= room[k, i] * room[k, j]
-            room[i, j] = value / pivot
-        dot += room[i, 6] * room[i, 6]
-    for i in range(5, -1, -1):
-        value = room[i, 6]
-        for j in range(i + 1, 6):
-            value -= room[i, j] * quadric[j]
-        quadric[i] = value / room[i, i]
-    return max(total - dot, 0.0) * radius * radius
+        x, y, z = xs[i], ys[i], zs[i]
+        dx, dy, dz = x - fx, y - fy, z - fz
+        along = dx * tx + dy * ty + dz * tz
+        across2 = dx * dx + dy * dy + dz * dz - along * along
+        across2 = across2 if across2 > 0.0 else 0.0
+        first = px * x + py * y + pz * z > level
+        own, other = across2 if first else 1e300, 1e300 if first else across2
+        near_a, near_b = own if own < near_a else near_a, other if other < near_b else near_b
+        own, other = across2 if first else 0.0, 0.0 if first else across2
+        far_a, far_b = own if own > far_a else far_a, other if other > far_b else far_b
+        along = along if across2 < beside2 else 0.0
+        low, high = along if along < low else low, along if along > high else high
+    near[0], near[1], near[2], near[3], near[4], near[5] = near_a, near_b, far_a, far_b, low, high
 
 
 @kernel
-def fit_sheets(vectors, places, squared, count, spacing, normals, side, best_side, room, solve, features, sheets):
+def _margin(vectors, count, spacing, sheets):
+    """Least difference, over stretches of the line, of the point's distance and that of the nearest other, in spacings.
+
+    Below zero a stretch of the line runs through the point's own cell.
+    """
+    margin = 2.0
+    for step in range(-2, 3):
+        shift = 0.3 * step * spacing
+        x, y, z = sheets[9] + shift * sheets[6], sheets[10] + shift * sheets[7], sheets[11] + shift * sheets[8]
+        nearest = np.inf
+        for i in range(1, min(count, _MARGIN_NEIGHBORS)):
+            dx, dy, dz = vectors[0, i] - x, vectors[1, i] - y, vectors[2, i] - z
+            nearest = min(nearest, dx * dx + dy * dy + dz * dz)
+        margin = min(margin, (math.sqrt(x * x + y * y + z * z) - math.sqrt(nearest)) / spacing)
+    return margin
+
+
+@kernel
+def fit_sheets(vectors, places, squared, count, spacing, normals, room, features, sheets):
     """Fit two planes to the `count` nearest neighbours, and describe how well that explains them.
 
-    Parameters: the neighbours (k, 3) relative to the point, nearest first, their places and squared distances; the
-    spacing; the plane (4,) fitted to these neighbours; those fitted at each sorted point (N, 4) at a smaller scale;
-    room. Writes `features` (13,) and `sheets` (20,): both normals, the line's direction and its point nearest to the
-    query, the number of neighbours of either and their centroids.
+    Parameters: the neighbours (3, k) relative to the point, nearest first, their places and squared distances; the
+    spacing; the planes fitted at each sorted point (N, 4) at a smaller scale; room (12, 24). Writes `features` (13,)
+    and `sheets` (24,): both normals, the line's direction and its point nearest to the query, the number of neighbours
+    of either and their centroids, and the plane (normal and level) that parts them.
     """
     features[:] = 0.0
     sheets[:] = 0.0
-    radius2 = squared[count - 1]
-    radius = math.sqrt(radius2)
+    radius = math.sqrt(squared[count - 1])
     if radius == 0.0 or spacing == 0.0:
         return
+    whole, plane, quadric, start, fits = room[0, :10], room[1, :6], room[2], room[3, :4], room[4:9, :10]
     # The one plane and the quadric: what a smooth surface would leave.
-    side[:count] = 0
-    _, one = _plane_of(vectors, count, side, 0, room[3])
-    quadric = room[4]
-    bent = _quadric(vectors, count, room[3], radius, solve, quadric)
-    _part_by_curvature(vectors, count, room[3], quadric, side)
-    two = _refine(vectors, count, side, sheets, room)
-    best_side[:count] = side[:count]
-    chosen = room[5]
-    if _part_by_normals(places, squared, count, normals, chosen, radius2):
-        i, j = int(chosen[0]), int(chosen[1])
-        room[0, 0:3] = normals[places[i], 0:3]
-        room[1, 0:3] = normals[places[j], 0:3]
-        room[0, 3:6] = vectors[i]
-        room[1, 3:6] = vectors[j]
-        if _bisect(vectors, count, room[0], room[1], side, room[2]):
-            other = _refine(vectors, count, side, room[6], room)
+    moments(vectors, count, 0.0, 0.0, 0.0, -1.0, whole)
+    one = plane_of(whole, plane)
+    bent = fit_quadric(vectors, count, plane, radius, quadric)
+    _across_bend(plane, quadric, start)
+    two = _refine(vectors, count, whole, start, sheets, fits)
+    i, j = _most_different(places, squared, count, normals)
+    if j >= 0:
+        a, b, line, second = room[9], room[10], room[11, :10], room[1]
+        _of_neighbor(normals, places[i], vectors, i, a)
+        _of_neighbor(normals, places[j], vectors, j, b)
+        if _bisect(a, b, line):
+            start[0], start[1], start[2], start[3] = line[6], line[7], line[8], line[9]
+            other = _refine(vectors, count, whole, start, second, fits)
             if other < two:
                 two = other
-                sheets[:] = room[6]
-                best_side[:count] = side[:count]
-    scale2 = spacing * spacing
-    rms_one = math.sqrt(one / count / scale2)
-    rms_bent = math.sqrt(bent / count / scale2)
+                sheets[:] = second
+    rms_one, rms_bent = math.sqrt(one / count) / spacing, math.sqrt(bent / count) / spacing
     features[0] = math.log(rms_one + 0.01)
     features[1] = math.log(rms_bent + 0.01)
     if not two < np.inf:
@@ -245,44 +239,21 @@ def fit_sheets(vectors, places, squared, count, spacing, normals, side, best_sid
         features[5:8] = 4.0
         features[11] = 2.0
         return
-    rms_two = math.sqrt(two / count / scale2)
+    rms_two = math.sqrt(two / count) / spacing
     features[2] = math.log(rms_two + 0.01)
     cosine = abs(sheets[0] * sheets[3] + sheets[1] * sheets[4] + sheets[2] * sheets[5])
     features[3] = math.acos(min(cosine, 1.0))
-    # How sharply: turn of the surface over what noise alone would turn it.
-    n_a, n_b = sheets[12], sheets[13]
-    features[4] = min(n_a, n_b) / count
+    features[4] = min(sheets[12], sheets[13]) / count
     fx, fy, fz = sheets[9], sheets[10], sheets[11]
-    tx, ty, tz = sheets[6], sheets[7], sheets[8]
     away = math.sqrt(fx * fx + fy * fy + fz * fz) / spacing
     features[5] = min(away, 4.0)
     features[6] = min(abs(sheets[0] * fx + sheets[1] * fy + sheets[2] * fz) / spacing, 4.0)
     features[7] = min(abs(sheets[3] * fx + sheets[4] * fy + sheets[5] * fz) / spacing, 4.0)
-    # How near the line the neighbours of either plane come and how far they reach, along the line too.
-    near_a, near_b, far_a, far_b, low, high = np.inf, np.inf, 0.0, 0.0, 0.0, 0.0
-    for i in range(count):
-        dx, dy, dz = vectors[i, 0] - fx, vectors[i, 1] - fy, vectors[i, 2] - fz
-        along = dx * tx + dy * ty + dz * tz
-        across = math.sqrt(max(dx * dx + dy * dy + dz * dz - along * along, 0.0))
-        if best_side[i] == 0:
-            near_a, far_a = min(near_a, across), max(far_a, across)
-        else:
-            near_b, far_b = min(near_b, across), max(far_b, across)
-        if across < 1.5 * spacing:
-            low, high = min(low, along), max(high, along)
-    features[8] = min(max(near_a, near_b) / spacing, 4.0)
-    features[9] = min(far_a, far_b) / radius
-    features[10] = min(-low, high) / radius
-    # Whether any stretch of the line near the point is nearer to it than to all neighbours.
-    margin = 2.0
-    if away < 3.0:
-        for step in range(-2, 3):
-            x, y, z = fx + 0.3 * step * spacing * tx, fy + 0.3 * step * spacing * ty, fz + 0.3 * step * spacing * tz
-            own = math.sqrt(x * x + y * y + z * z)
-            nearest = np.inf
-            for i in range(1, min(count, 16)):
-                dx, dy, dz = vectors[i, 0] - x, vectors[i, 1] - y, vectors[i, 2] - z
-                nearest = min(nearest, dx * dx + dy * dy + dz * dz)
-            margin = min(margin, (own - math.sqrt(nearest)) / spacing)
-    features[11] = margin
+    near = room[3]
+    near[0] = 2.25 * spacing * spacing
+    _reaches(vectors, count, sheets, near)
+    features[8] = min(math.sqrt(max(near[0], near[1])) / spacing, 4.0)
+    features[9] = math.sqrt(min(near[2], near[3])) / radius
+    features[10] = min(-near[4], near[5]) / radius
+    features[11] = min(_margin(vectors, count, spacing, sheets), 2.0) if away < 3.0 else 2.0
     features[12] = math.log((rms_two + 0.01) / (rms_bent + 0.01))

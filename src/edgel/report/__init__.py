@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from edgel.cloud import Cloud
 from edgel.edges import Edges
 from edgel.figures import draw_figures
 from edgel.io.files import replacing
+from edgel.report.histograms import Histogram, angle_histogram, strength_histogram
 from edgel.report.page import opening, page, section
-from edgel.report.tables import Table, count_table, parameter_table, time_table
+from edgel.report.tables import Table, count_table, parameter_table, preset_table, time_table
 from edgel.synth import Part
 
 __all__ = ["Case", "Table", "make_directory", "write_report"]
@@ -36,6 +37,10 @@ class Case:
         The part it was scanned from, when it is simulated.
     tables : sequence of Table
         Comparison numbers of this cloud, shown below its own.
+    other : Edges or None
+        What another preset finds in this cloud, to compare.
+    files : mapping of str to path
+        Files that belong to it, by what they hold; the page links to them.
     """
 
     name: str
@@ -43,6 +48,8 @@ class Case:
     edges: Edges
     part: Part | None = None
     tables: Sequence[Table] = ()
+    other: Edges | None = None
+    files: Mapping[str, str | os.PathLike[str]] = field(default_factory=dict)
 
 
 def write_report(
@@ -53,7 +60,7 @@ def write_report(
     findings: Sequence[str] = (),
     tables: Sequence[Table] = (),
 ) -> Path:
-    """Write a page with figures, counts, times and parameters of each case, and its figures as PNG beside it.
+    """Write a page with figures, counts, histograms, times and parameters of each case, its figures as PNG beside it.
 
     Parameters
     ----------
@@ -71,7 +78,7 @@ def write_report(
     Returns
     -------
     Path
-        The page. It holds its figures itself and can be sent on alone.
+        The page. It holds its figures itself and can be sent on alone; only its links need what lies beside it.
 
     Raises
     ------
@@ -85,16 +92,32 @@ def write_report(
     folder = make_directory(directory)
     parts, taken = [opening(title, findings, tables)], set()
     for case in cases:
-        figures = draw_figures(case.cloud, case.edges, name=case.name, part=case.part)
         stem = _file_stem(case.name, taken)
-        for figure in figures:
-            with replacing(folder / f"{stem}-figure-{figure.number}.png") as file:
+        drawn = draw_figures(case.cloud, case.edges, name=case.name, part=case.part, other=case.other)
+        figures = {f"{stem}-figure-{figure.number}.png": figure for figure in drawn}
+        for name, figure in figures.items():
+            with replacing(folder / name) as file:
                 file.write(figure.png)
-        own = [count_table(case.edges), *case.tables, time_table(case.edges), parameter_table(case.edges)]
-        parts.append(section(case.name, figures, own))
+        parts.append(section(case.name, figures, _tables(case), _histograms(case.edges), _addresses(case, folder)))
     with replacing(folder / PAGE) as file:
         file.write(page(title, parts).encode())
     return folder / PAGE
+
+
+def _tables(case: Case) -> list[Table]:
+    compared = [] if case.other is None else [preset_table(case.edges, case.other)]
+    return [count_table(case.edges), *compared, *case.tables, time_table(case.edges), parameter_table(case.edges)]
+
+
+def _histograms(edges: Edges) -> list[Histogram]:
+    angles = angle_histogram(edges)
+    return [strength_histogram(edges), *([] if angles is None else [angles])] if len(edges) else []
+
+
+def _addresses(case: Case, folder: Path) -> list[tuple[str, str]]:
+    """What the files of a case hold, and where they lie as seen from the page; none on another drive of Windows."""
+    near = {what: path for what, path in case.files.items() if Path(path).resolve().drive == folder.resolve().drive}
+    return [(what, Path(os.path.relpath(path, folder)).as_posix()) for what, path in near.items()]
 
 
 def make_directory(directory: str | os.PathLike[str]) -> Path:

@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from edgel.edges import Edges
 from edgel.parallel import num_threads
 
@@ -67,6 +69,22 @@ def count_table(edges: Edges) -> Table:
     if not math.isnan(edges.median_crease_angle):
         note += f" Half of the creases turn by more than {math.degrees(edges.median_crease_angle):.1f} degrees."
     return Table("Counts", rows, {"number": ",d", "share": ".1%"}, note)
+
+
+def preset_table(edges: Edges, other: Edges) -> Table:
+    """What two presets find in the same cloud, and what of it is the same."""
+    rows = []
+    for one in sorted((edges, other), key=lambda one: one.preset):
+        kinds = ", ".join(f"{name} {number:,}" for name, number in one.count_kinds().items())
+        seconds = sum(one.seconds.values())
+        rows.append(
+            {"preset": one.preset, "edge points": len(one), "share": one.share, "seconds": seconds, "kinds": kinds}
+        )
+    both = len(np.intersect1d(edges.index, other.index))
+    share = both / (edges.num_points - edges.num_dropped)
+    rows.append({"preset": "points of both", "edge points": both, "share": share, "seconds": None, "kinds": None})
+    note = f"The preset {other.preset} was run to compare, with its own defaults."
+    return Table("Both presets", rows, {"edge points": ",d", "share": ".1%", "seconds": ".2f"}, note)
 
 
 def time_table(edges: Edges) -> Table:

@@ -1,0 +1,151 @@
+"""A second look: what the neighbours of a likely edge point make of themselves.
+
+An edge is a chain one point thick: a point is the likelier on it the surer the points before and behind it are, and the
+less likely the surer those beside it are. This is the thinning and the hysteresis of Canny's method, along the edge.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from edgel.evidence.scales import spacing_of
+from edgel.normals import smallest_eigenpair
+from edgel.parallel import kernel
+
+NEIGHBORS = 24
+NUM_FEATURES = 19
+_AHEAD, _ASIDE = 0.8, 0.6  # cosines to the edge: neighbours before and behind it, and beside it
+_FAR, _BESIDE = 3.0, 1.8  # spacings within which they lie
+_SAME_LINE = 0.35  # spacings between lines that two points beside each other put the same edge on
+
+
+@kernel
+def look_around(first, places, squared, queries, query_order, xyz, chance, other, slot, lines, feet, features):
+    """Describe the chances of a kind of edge around some points.
+
+    Parameters: the chance of that kind and of the other at every sorted point, (N,) float32; which row of `lines` and
+    `feet` (M, 3), the direction of its line and the line's place nearest to it, is its own, (N,) int32, -1 for none.
+    Writes `features` (Q, 19).
+    """
+    k = places.shape[1]
+    away = np.empty((3, k))
+    for q in range(places.shape[0]):
+        out = features[query_order[first + q]]
+        out[:] = 0.0
+        spacing = spacing_of(squared[q])
+        if spacing == 0.0:
+            continue
+        for axis in range(3):
+            for i in range(k):
+                away[axis, i] = (xyz[axis, places[q, i]] - queries[axis, first + q]) / spacing
+        own = chance[places[q, 0]]
+        tx, ty, tz, line_like = _main_direction(places[q], away, chance)
+        s = slot[places[q, 0]]
+        agree = 0.0
+        if s >= 0:
+            agree = abs(lines[s, 0] * tx + lines[s, 1] * ty + lines[s, 2] * tz)
+        out[0], out[1], out[2] = own, line_like, agree
+        _sums(places[q], chance, other, out)
+        _along_and_across(places[q], away, chance, tx, ty, tz, own, out)
+        if s >= 0:
+            _along_and_across_line(places[q], away, chance, slot, lines, feet, s, spacing, out)
+
+
+@kernel
+def _main_direction(places, away, chance):
+    """Direction along which the chances lie, and how far they lie on a line, 0 to 1."""
+    xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(1, len(places)):
+        w = chance[places[i]]
+        x, y, z = away[0, i], away[1, i], away[2, i]
+        xx, xy, xz, yy, yz, zz = (
+            xx + w * x * x,
+            xy + w * x * y,
+            xz + w * x * z,
+            yy + w * y * y,
+            yz + w * y * z,
+            zz + w * z * z,
+        )
+    trace = xx + yy + zz
+    if not trace > 0.0:
+        return 1.0, 0.0, 0.0, 0.0
+    # The largest eigenvector of a matrix is the smallest one of its negative.
+    largest, middle, x, y, z = smallest_eigenpair(-xx, -xy, -xz, -yy, -yz, -zz)
+    return x, y, z, (middle - largest) / trace
+
+
+@kernel
+def _sums(places, chance, other, out):
+    """Write the three largest chances of the 8 nearest, means over 8, 16 and all, and the other kind's largest."""
+    a, b, c, total, others = 0.0, 0.0, 0.0, 0.0, 0.0
+    k = len(places)
+    for i in range(1, k):
+        p = chance[places[i]]
+        total += p
+        if i <= 8:
+            if p > a:
+                a, b, c = p, a, b
+            elif p > b:
+                b, c = p, b
+            elif p > c:
+                c = p
+            others = max(others, other[places[i]])
+        if i == min(8, k - 1):
+            out[6] = total / i
+        if i == min(16, k - 1):
+            out[7] = total / i
+    out[3], out[4], out[5], out[8] = a, b, c, total / max(k - 1, 1)
+    out[9], out[10] = other[places[0]], others
+
+
+@kernel
+def _along_and_across(places, away, chance, tx, ty, tz, own, out):
+    """Write the largest chances before and behind the point, and beside it, by the direction of the chances."""
+    ahead, behind, beside = 0.0, 0.0, 0.0
+    for i in range(1, len(places)):
+        x, y, z = away[0, i], away[1, i], away[2, i]
+        far = math.sqrt(x * x + y * y + z * z)
+        if far > _FAR or far == 0.0:
+            continue
+        cosine = (x * tx + y * ty + z * tz) / far
+        p = chance[places[i]]
+        if cosine > _AHEAD:
+            ahead = max(ahead, p)
+        elif cosine < -_AHEAD:
+            behind = max(behind, p)
+        elif abs(cosine) < _ASIDE and far < _BESIDE:
+            beside = max(beside, p)
+    out[11], out[12], out[13] = max(ahead, behind), min(ahead, behind), own - beside
+
+
+@kernel
+def _along_and_across_line(places, away, chance, slot, lines, feet, s, spacing, out):
+    """The same by the point's own line, and what those beside it that see the same line make of it."""
+    tx, ty, tz = lines[s, 0], lines[s, 1], lines[s, 2]
+    fx, fy, fz = feet[s, 0] / spacing, feet[s, 1] / spacing, feet[s, 2] / spacing
+    own_away = math.sqrt(fx * fx + fy * fy + fz * fz)
+    ahead, behind, rivals, nearer = 0.0, 0.0, 0.0, -2.0
+    for i in range(1, len(places)):
+        x, y, z = away[0, i], away[1, i], away[2, i]
+        far = math.sqrt(x * x + y * y + z * z)
+        j = slot[places[i]]
+        if far > _FAR or far == 0.0 or j < 0:
+            continue
+        cosine = (x * tx + y * ty + z * tz) / far
+        p = chance[places[i]] * abs(tx * lines[j, 0] + ty * lines[j, 1] + tz * lines[j, 2])
+        if cosine > _AHEAD:
+            ahead = max(ahead, p)
+        elif cosine < -_AHEAD:
+            behind = max(behind, p)
+        elif abs(cosine) < _ASIDE:
+            gx, gy, gz = feet[j, 0] / spacing, feet[j, 1] / spacing, feet[j, 2] / spacing
+            dx, dy, dz = x + gx - fx, y + gy - fy, z + gz - fz
+            along = dx * tx + dy * ty + dz * tz
+            apart = math.sqrt(max(dx * dx + dy * dy + dz * dz - along * along, 0.0))
+            if apart < _SAME_LINE and p > 0.1:
+                rivals += p
+                nearer = max(nearer, own_away - math.sqrt(gx * gx + gy * gy + gz * gz))
+    out[14], out[15], out[16], out[17] = max(ahead, behind), min(ahead, behind), rivals, nearer
+    out[18] = min(own_away, 4.0)

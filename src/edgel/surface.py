@@ -1,0 +1,112 @@
+"""How the surface of a cloud looks in a picture: its colors, and what they mean."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from edgel.cloud import Cloud, check_points
+from edgel.color.channels import intensity_of, rgb_of
+from edgel.legend import Entry
+from edgel.palette import ramp_colors
+from edgel.scene import Scene
+
+COLOR_BY = ("grey", "rgb", "intensity", "height", "normals")
+
+_TAIL = 1.0  # percent of the heights at either end that share the ramp's end colors
+_DARKEST = 0.62  # what is left of a color on the slope that gets least light
+_PALE, _PALE_GREY = 0.45, 225  # share of this grey in the colors of a surface, so that edges stand out
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """What a picture is drawn on.
+
+    Attributes
+    ----------
+    paper, ink : (int, int, int)
+        Color where there is nothing, and of letters.
+    greys : (int, int)
+        Of the darkest and of the lightest slope.
+    """
+
+    paper: tuple[int, int, int]
+    ink: tuple[int, int, int]
+    greys: tuple[int, int]
+
+
+SHEETS = {
+    "light": Sheet((255, 255, 255), (28, 28, 28), (120, 236)),
+    "dark": Sheet((23, 23, 26), (232, 232, 230), (105, 205)),
+}
+
+
+class Surface:
+    """The colors of a cloud's surface.
+
+    Parameters
+    ----------
+    cloud : Cloud
+    color_by : str
+        One of `COLOR_BY`.
+
+    Attributes
+    ----------
+    entries : list of Entry
+        What the legend has to say of the colors.
+
+    Raises
+    ------
+    ValueError
+        If `color_by` is unknown, or the cloud does not carry it.
+    """
+
+    def __init__(self, cloud: Cloud, color_by: str) -> None:
+        if color_by not in COLOR_BY:
+            raise ValueError(f"color_by: expected one of {', '.join(COLOR_BY)}, got {color_by!r}")
+        self.entries: list[Entry] = []
+        self._color_by = color_by
+        self._colors = np.empty((0, 3))  # one a point, 0 to 255; grey and normals come from the picture
+        if color_by == "height":
+            heights = cloud.xyz[:, 2]
+            low, high = np.percentile(check_points(cloud, minimum=1).xyz[:, 2], [_TAIL, 100.0 - _TAIL])
+            self._colors = ramp_colors(np.nan_to_num((heights - low) / (high - low or 1.0)))
+            ramp = _muted(ramp_colors(np.linspace(0, 1, 32)), np.ones(32))
+            self.entries.append(Entry(ramp.astype(np.uint8), f"{high:.6g}", f"height {low:.6g}"))
+        elif color_by in ("rgb", "intensity"):
+            self._colors = _carried(cloud, color_by)
+            if color_by == "rgb":
+                self._colors = _muted(self._colors, np.ones(len(cloud)))
+
+    def paint(self, scene: Scene, sheet: Sheet) -> np.ndarray:
+        """Paint the scene of the cloud, (height, width, 3) uint8 at its fine pixels."""
+        shade = scene.shaded_by_slope()
+        if self._color_by == "grey":
+            colors = (sheet.greys[0] + (sheet.greys[1] - sheet.greys[0]) * shade)[..., None]
+        elif self._color_by == "normals":
+            colors = _muted(127.5 * (1.0 + scene.normals_by_slope()), shade)
+        else:
+            colors = self._colors[scene.rows][scene.winner]
+            if self._color_by == "height":
+                colors = _muted(colors, shade)
+        painted = np.empty((*scene.covered.shape, 3), np.uint8)
+        painted[...] = (colors + 0.5).astype(np.uint8)
+        painted[~scene.covered] = sheet.paper
+        return painted
+
+
+def _carried(cloud: Cloud, color_by: str) -> np.ndarray:
+    """The cloud's own colors, (N, 3) in 0 to 255."""
+    values = rgb_of(cloud) if color_by == "rgb" else intensity_of(cloud)
+    if values is None:
+        lacks = "no red, green and blue" if color_by == "rgb" else "no intensity that differs between points"
+        raise ValueError(f"color_by: the cloud carries {lacks}; color it by grey, height or normals")
+    values = 255.0 * np.nan_to_num(values, nan=0.5)
+    return (values if values.ndim == 2 else values[:, None].repeat(3, axis=1)).astype(np.float32)
+
+
+def _muted(colors: np.ndarray, shade: np.ndarray) -> np.ndarray:
+    """Colors (..., 3), 0 to 255, darkened by the shade (...,) and paled."""
+    lit = colors.astype(np.float32) * (_DARKEST + (1.0 - _DARKEST) * shade)[..., None]
+    return (1.0 - _PALE) * lit + _PALE * _PALE_GREY
