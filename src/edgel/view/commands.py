@@ -10,7 +10,6 @@ import numpy as np
 
 from edgel.detect import DEFAULT_KINDS
 from edgel.edges import kind_names
-from edgel.view.scale import HAS_MIN_STRENGTH
 from edgel.view.session import Pane
 from edgel.view.settings import STRENGTH, Settings
 
@@ -33,10 +32,8 @@ def command_line(pane: Pane, settings: Settings) -> str:
             return "# no kind of edge is chosen"
         if settings.kinds != DEFAULT_KINDS:
             words += ["--kinds", ",".join(kind_names(settings.kinds))]
-        if settings.strength != STRENGTH and HAS_MIN_STRENGTH:
+        if settings.strength != STRENGTH:
             words += ["--min-strength", f"{settings.strength:g}"]
-        elif settings.strength != STRENGTH:
-            missing.append("least strength")
         missing += ["least angle"] if settings.angle > 0 else []
     missing += ["crop"] if settings.is_cropped else []
     words += ["-o", output_name(pane)]
@@ -53,8 +50,7 @@ def python_lines(pane: Pane, settings: Settings) -> str:
     options = []
     if default and settings.kinds != DEFAULT_KINDS:
         options.append(f"kinds={kind_names(settings.kinds)!r}")
-    faint = default and settings.strength != STRENGTH
-    if faint and HAS_MIN_STRENGTH:
+    if default and settings.strength != STRENGTH:
         options.append(f"min_strength={settings.strength:g}")
     if not default:
         options.append("preset='paper'")
@@ -62,8 +58,6 @@ def python_lines(pane: Pane, settings: Settings) -> str:
     lines = [f"cloud = edgel.read({pane.source.path!r}{camera})"]
     function = f"detect_at_scale(cloud, {settings.scale:g}" if scaled else "edgel.detect(cloud"
     lines.append(f"edges = {', '.join([function, *options])})")
-    if faint and not HAS_MIN_STRENGTH:
-        lines.append(f"edges = edges.take(edges.strength >= {settings.strength:g})")
     if blunt:
         lines.append(f"edges = drop_blunt(edges, math.radians({math.degrees(settings.angle):g}))")
     if settings.is_cropped:

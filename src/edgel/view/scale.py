@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any, Literal
@@ -15,9 +14,6 @@ from edgel.detect import DEFAULT_KINDS
 from edgel.edges import EdgeKind, Edges
 from edgel.kdtree import build_index
 from edgel.neighbors import knn
-
-HAS_MIN_STRENGTH = "min_strength" in inspect.signature(edgel.detect).parameters
-"""Whether the detector finds edges fainter than it shows by default; else there are only those to filter."""
 
 
 def median_spacing(points: Any) -> float:
@@ -133,8 +129,4 @@ def detect_at_scale(
 def _detect(cloud: edgel.Cloud, preset: Any, kinds: Any, min_strength: float, progress: Any) -> Edges:
     if preset == "paper":
         return edgel.detect(cloud, preset=preset, progress=progress)
-    if HAS_MIN_STRENGTH:
-        options: dict[str, Any] = {"min_strength": min_strength}
-        return edgel.detect(cloud, kinds=kinds, progress=progress, **options)
-    edges = edgel.detect(cloud, kinds=kinds, progress=progress)
-    return edges.take(edges.strength >= min_strength)
+    return edgel.detect(cloud, kinds=kinds, min_strength=min_strength, progress=progress)

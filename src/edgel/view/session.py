@@ -17,12 +17,12 @@ from edgel.detect import DEFAULT_KINDS
 from edgel.edges import EdgeKind, Edges
 from edgel.io.errors import describe_error
 from edgel.view.latest import Latest
-from edgel.view.scale import HAS_MIN_STRENGTH, detect_at_scale
+from edgel.view.scale import detect_at_scale
 from edgel.view.select import select
 from edgel.view.settings import Run, Settings
 from edgel.view.source import Source
 
-LEAST_STRENGTH = 0.2 if HAS_MIN_STRENGTH else 0.5  # what the detector is run with; the slider goes no lower
+LEAST_STRENGTH = 0.2  # what the detector is run with; the slider goes no lower
 _KEPT = 24  # answers remembered, so that moving back is immediate
 
 
