@@ -1,5 +1,6 @@
 """The viewer without a browser: what is asked for, what runs, what is shown, what is said."""
 
+import io
 import shlex
 import subprocess
 import sys
@@ -9,14 +10,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import edgel
-from edgel import EdgeKind
+from edgel import EdgeKind, plot
 from edgel.cli import app
 from edgel.detect import DEFAULT_KINDS
+from edgel.palette import KIND_COLORS
 from edgel.view import detect_at_scale, drop_blunt, in_box, median_spacing, thin
 from edgel.view import source as source_module
-from edgel.view.colors import KIND_COLORS, cloud_colors, colorings, edge_colors
+from edgel.view.colors import cloud_colors, colorings, edge_colors
 from edgel.view.commands import command_line, python_lines
 from edgel.view.latest import Latest
 from edgel.view.layout import FIELD_OF_VIEW, lay_out
@@ -281,7 +284,7 @@ def test_files_of_one_name_are_told_apart(open_session, hall_file, tmp_path):
 # Filters
 
 
-@pytest.mark.parametrize("strength", [LEAST_STRENGTH, 0.5, 0.7, 0.93, 1.0])
+@pytest.mark.parametrize("strength", [LEAST_STRENGTH, 0.35, 0.5, 0.7, 0.93, 1.0])
 def test_filtering_by_strength_equals_detecting(strength):
     cloud = edgel.Cloud(hall())
     settings = Settings(strength=strength)
@@ -486,13 +489,21 @@ def test_saved_edges_are_those_of_detect(open_session, hall_file, extension, tmp
     np.testing.assert_array_equal(written.xyz, cloud.xyz[edges.index])
 
 
-def test_picture_shows_the_edges(open_session, hall_file):
+def test_picture_shows_what_is_seen(open_session, hall_file):
     session = open_session([hall_file])
-    session.settings = Settings(crop=((0.0, 0.5), (0.0, 1.0), (0.0, 1.0)))
+    settings = Settings(crop=((0.0, 0.5), (0.0, 1.0), (0.0, 1.0)), coloring=Coloring.HEIGHT, by_strength=True)
+    session.settings = settings
     assert session.wait_idle(TIMEOUT)
-    name, content = picture_file(session.panes()[0], np.array([0.0, 0.0, -1.0]))
-    assert name.endswith(".png")
-    assert content.startswith(b"\x89PNG")
+    (pane,) = session.panes()
+    assert pane.edges is not None
+    name, content = picture_file(pane, np.array([0.0, 0.0, -1.0]), settings)
+    assert name == "a hall_edges.png"
+    shown = np.asarray(Image.open(io.BytesIO(content)))
+    cloud = pane.cloud.take(in_box(pane.cloud.xyz, pane.box))
+    rows = np.flatnonzero((cloud.xyz[:, None] == pane.cloud.xyz[pane.edges.index]).all(axis=2).any(axis=1))
+    edges = replace(pane.edges, index=rows, num_points=len(cloud))
+    look = {"color_by": "height", "edge_color": "strength", "size": (1600, 1200)}
+    np.testing.assert_array_equal(shown, plot.picture(cloud, edges, direction=[0, 0, -1], **look))
 
 
 def test_clicks_choose_the_foremost():

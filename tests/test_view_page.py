@@ -10,7 +10,7 @@ from browser import CHROMIUM, choose, chromium, input_of, picture, type_number
 
 import edgel
 from edgel import EdgeKind, synth
-from edgel.view.colors import KIND_COLORS
+from edgel.palette import KIND_COLORS
 
 for needed in ("viser", "playwright"):
     if importlib.util.find_spec(needed) is None:

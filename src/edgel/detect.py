@@ -111,7 +111,7 @@ def detect(
     k = check_num_neighbors(num_neighbors, len(checked.xyz))
 
     stages = Stages(progress)
-    found = Marks(len(checked.xyz), min_strength)
+    found = Marks(len(checked.xyz))
     with stages("index"):
         index = build_index(checked.xyz)
     with stages("survey"):
@@ -135,17 +135,18 @@ def detect(
             contrast = color_edges(index, checked.xyz, normals, channels[checked.rows]).strength
             found.mark(np.arange(len(checked.xyz)), EdgeKind.COLOR, color_strength(contrast))
     with stages("faces"):
-        edge = np.flatnonzero(found.kind & int(kinds))
+        kind = found.of(kinds, min_strength)
+        edge = np.flatnonzero(kind)
         at = checked.xyz[edge]
         planes = towards(plane_fits(index, at, k), at, viewpoint)
-        creased = np.flatnonzero(found.kind[verdict.rows] & EdgeKind.CREASE & int(kinds))
+        creased = np.flatnonzero(kind[verdict.rows] & EdgeKind.CREASE)
         rows = verdict.rows[creased]
         sides = faces(verdict.evidence.take(creased), checked.xyz[rows], viewpoint).spread(
             edge, rows, at, planes.normals
         )
     return Edges(
         index=checked.rows[edge],
-        kind=found.kind[edge] & np.uint8(kinds),
+        kind=kind[edge],
         strength=found.strength[edge],
         position=sides.position,
         direction=sides.direction,
@@ -180,15 +181,23 @@ def color_strength(contrast: np.ndarray) -> np.ndarray:
 
 
 class Marks:
-    """The edge points found so far: kinds (N,) uint8 and strength (N,) of the most marked kind."""
+    """The edge points found so far: kinds (N,) uint8 and strength (N,) of the most marked kind.
 
-    def __init__(self, count: int, least: float) -> None:
+    A kind less likely than not (strength below one half) counts only where no other is more likely. So the kinds of a
+    point do not depend on how faint the edges are that were asked for.
+    """
+
+    def __init__(self, count: int) -> None:
         self.kind = np.zeros(count, np.uint8)
         self.strength = np.zeros(count)
-        self.least = least
 
     def mark(self, rows: np.ndarray, kind: EdgeKind | np.ndarray, strength: np.ndarray) -> None:
-        """Add a kind (one, or (M,) flags) at rows (M,) whose strength (M,) is the least wanted or more."""
-        enough = strength >= self.least
-        self.kind[rows] |= np.where(enough, kind, 0).astype(np.uint8)
-        self.strength[rows] = np.maximum(self.strength[rows], np.where(enough, strength, 0))
+        """Add a kind (one, or (M,) flags) at rows (M,), with its strength (M,)."""
+        before, flags = self.strength[rows], np.where(strength > 0, kind, 0).astype(np.uint8)
+        both = (before >= 0.5) & (strength >= 0.5)
+        self.kind[rows] = np.where(both, self.kind[rows] | flags, np.where(strength > before, flags, self.kind[rows]))
+        self.strength[rows] = np.maximum(before, strength)
+
+    def of(self, kinds: EdgeKind, least: float) -> np.ndarray:
+        """Return the kinds (N,) uint8 among those wanted, of the points that have the least strength or more."""
+        return np.where(self.strength >= least, self.kind & np.uint8(kinds), np.uint8(0))

@@ -8,18 +8,9 @@ import numpy as np
 
 from edgel.color.channels import color_channels
 from edgel.edges import EdgeKind, Edges
+from edgel.palette import kind_colors, ramp_colors
 from edgel.view.settings import Coloring
 from edgel.view.source import Source
-
-KIND_COLORS: dict[EdgeKind, tuple[int, int, int]] = {
-    EdgeKind.OCCLUDING: (235, 110, 0),
-    EdgeKind.OCCLUDED: (140, 60, 190),
-    EdgeKind.BOUNDARY: (0, 90, 220),
-    EdgeKind.CREASE: (205, 0, 30),
-    EdgeKind.COLOR: (0, 140, 60),
-    EdgeKind.IMAGE: (200, 0, 130),
-}
-"""A point of several kinds has the color of the one that comes first."""
 
 KIND_MEANINGS: dict[EdgeKind, str] = {
     EdgeKind.OCCLUDING: "near side of a step in depth",
@@ -30,7 +21,6 @@ KIND_MEANINGS: dict[EdgeKind, str] = {
     EdgeKind.IMAGE: "edge of the projected image",
 }
 
-STRENGTH_RAMP = np.array([[255, 214, 90], [240, 120, 20], [190, 20, 40], [80, 0, 60]], float)
 _HEIGHT_RAMP = np.array([[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [240, 220, 60]], float)
 _LIGHT = np.array([-0.35, -0.45, 0.82])  # towards the light, in the scene: from the left, the front and above
 _GREYS = (105.0, 232.0)
@@ -86,15 +76,11 @@ def cloud_colors(source: Source, coloring: Coloring, rotation: np.ndarray) -> np
 
 def edge_colors(edges: Edges, *, by_strength: bool, least: float) -> np.ndarray:
     """Color edge points by their kind, or by strength from `least` (light) to 1 (dark)."""
-    if by_strength:
-        if edges.preset == "paper":  # its strengths are shares of the largest step there can be: all small
-            least, largest = 0.0, edges.strength.max(initial=1e-9)
-            return _ramp(edges.strength / largest, STRENGTH_RAMP)
-        return _ramp((edges.strength - least) / max(1.0 - least, 1e-9), STRENGTH_RAMP)
-    colors = np.zeros((len(edges), 3), np.uint8)
-    for kind, color in reversed(KIND_COLORS.items()):
-        colors[(edges.kind & kind) > 0] = color
-    return colors
+    if not by_strength:
+        return kind_colors(edges.kind)
+    if edges.preset == "paper":  # its strengths are shares of the largest step there can be: all small
+        return ramp_colors(1.0 - edges.strength / edges.strength.max(initial=1e-9))
+    return ramp_colors((1.0 - edges.strength) / (1.0 - least))
 
 
 def _intensity(source: Source) -> np.ndarray | None:

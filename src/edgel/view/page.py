@@ -142,7 +142,7 @@ class Page:
         if layout is not None and pane.name in names:
             away = client.camera.look_at - client.camera.position
             direction = layout.places[names.index(pane.name)].to_cloud(away)
-            self._send(event, lambda: picture_file(pane, direction))
+            self._send(event, lambda: picture_file(pane, direction, self._session.settings))
 
     def _saved_pane(self, event: viser.GuiEvent[Any]) -> Pane | None:
         """Return the pane chosen, with the edges that the settings ask for now; say so where there are none yet."""

@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 import edgel
+from edgel.view.colors import colorings
 from edgel.view.commands import output_name
 from edgel.view.select import in_box
 from edgel.view.session import Pane
+from edgel.view.settings import Coloring, Settings
 
 _SIZE = (1600, 1200)
+_COLOR_BY = {
+    Coloring.GREY: "grey",
+    Coloring.OWN: "rgb",
+    Coloring.HEIGHT: "height",
+    Coloring.NORMALS: "normals",
+    Coloring.INTENSITY: "intensity",
+}
 
 
 def edges_file(pane: Pane, extension: str) -> tuple[str, bytes]:
@@ -37,16 +47,22 @@ def edges_file(pane: Pane, extension: str) -> tuple[str, bytes]:
         return name, (Path(folder) / name).read_bytes()
 
 
-def picture_file(pane: Pane, direction: np.ndarray) -> tuple[str, bytes]:
-    """Draw the part of the cloud that a pane shows, with its edges, along a direction (3,) of the cloud, as PNG."""
+def picture_file(pane: Pane, direction: np.ndarray, settings: Settings) -> tuple[str, bytes]:
+    """Draw what a pane shows along a direction (3,) of the cloud, with a legend; return the PNG's name and content."""
     from edgel import plot  # not at the top: Pillow takes time to import
 
     assert pane.edges is not None
-    cloud = pane.cloud
-    on_top = np.zeros(len(cloud), bool)
-    on_top[pane.edges.index] = True
-    inside = in_box(cloud.xyz, pane.box)
-    picture = plot.render(cloud.take(inside), rows_on_top=on_top[inside], direction=direction, size=_SIZE)
+    inside = in_box(pane.cloud.xyz, pane.box)
+    index = (np.cumsum(inside) - 1)[pane.edges.index]
+    coloring = settings.coloring if settings.coloring in colorings(pane.source) else Coloring.GREY
+    picture = plot.picture(
+        pane.cloud.take(inside),
+        replace(pane.edges, index=index, num_points=int(inside.sum()), num_dropped=0),
+        direction=direction,
+        size=_SIZE,
+        color_by=_COLOR_BY[coloring],
+        edge_color="strength" if settings.by_strength else "kind",
+    )
     name = output_name(pane, ".png")
     with tempfile.TemporaryDirectory() as folder:
         plot.save(Path(folder) / name, picture)

@@ -129,5 +129,4 @@ def detect_at_scale(
 def _detect(cloud: edgel.Cloud, preset: Any, kinds: Any, min_strength: float, progress: Any) -> Edges:
     if preset == "paper":
         return edgel.detect(cloud, preset=preset, progress=progress)
-    edges = edgel.detect(cloud, kinds=kinds, progress=progress)
-    return edges.take(edges.strength >= min_strength)
+    return edgel.detect(cloud, kinds=kinds, min_strength=min_strength, progress=progress)

@@ -22,7 +22,7 @@ from edgel.view.select import select
 from edgel.view.settings import Run, Settings
 from edgel.view.source import Source
 
-LEAST_STRENGTH = 0.5  # what the detector is run with; sliders cannot go below it
+LEAST_STRENGTH = 0.2  # what the detector is run with; the slider goes no lower
 _KEPT = 24  # answers remembered, so that moving back is immediate
 
 

@@ -8,7 +8,8 @@ from html import escape
 import numpy as np
 
 from edgel.edges import EdgeKind, Edges, kind_names
-from edgel.view.colors import KIND_COLORS, KIND_MEANINGS, STRENGTH_RAMP
+from edgel.palette import KIND_COLORS, as_hex, ramp_colors
+from edgel.view.colors import KIND_MEANINGS
 from edgel.view.session import Pane, Session
 from edgel.view.settings import Settings
 
@@ -46,7 +47,7 @@ def legend(panes: Sequence[Pane], settings: Settings) -> str:
     """Say which color means what, with the number of edge points shown of each kind, one column a pane."""
     found = [pane for pane in panes if pane.edges is not None]
     if settings.by_strength:
-        stops = ", ".join(_css(color) for color in STRENGTH_RAMP.astype(int))
+        stops = ", ".join(as_hex(tuple(color)) for color in ramp_colors(np.linspace(1.0, 0.0, 7)).tolist())
         bar = f"<div style='height:0.8em;background:linear-gradient(to right, {stops})'></div>"
         return f"<div style='{_BOX}'>{bar}<span>weak</span><span style='float:right'>strong</span></div>"
     rows = []
@@ -59,7 +60,7 @@ def legend(panes: Sequence[Pane], settings: Settings) -> str:
             cells = "".join(f"<td style='{_NUMBER}'>{number:,}</td>" for number in counts)
             meaning = f"<span style='{_NOTE}'>{KIND_MEANINGS[kind]}</span>"
             rows.append(
-                f"<tr><td style='color:{_css(color)};font-size:1.3em'>&#9632;</td>"
+                f"<tr><td style='color:{as_hex(color)};font-size:1.3em'>&#9632;</td>"
                 f"<td><b>{kind_names(kind)[0]}</b> {meaning}</td>{cells}</tr>"
             )
     return f"<div class='edgel-legend' style='{_BOX}'><table style='width:100%'>{''.join(rows)}</table></div>"
@@ -124,7 +125,3 @@ def _how(edges: Edges) -> str:
 
 def _count(pane: Pane, kind: EdgeKind) -> int:
     return 0 if pane.edges is None else int(np.count_nonzero(pane.edges.kind & kind))
-
-
-def _css(color: Sequence[int]) -> str:
-    return f"rgb({', '.join(str(int(channel)) for channel in color)})"
