@@ -14,10 +14,11 @@ import edgel
 ROOT = Path(edgel.__file__).parent
 # Each room may import from rooms on lines above its own, and from its own line.
 LAYERS = [
-    {"parallel", "stages"},
+    {"parallel", "stages", "lanes"},
     {"cloud"},
     {"kdtree"},
-    {"neighbors"},
+    {"search"},
+    {"neighbors", "planes"},
     {"normals", "canny"},
     {"project", "evidence", "edges", "raster", "color"},
     {"facets", "viewing"},

@@ -10,12 +10,9 @@ import numpy as np
 
 from edgel.cloud import as_cloud, as_vector, check_points, check_rows
 from edgel.kdtree import NeighborIndex, build_index
-from edgel.neighbors import visit_neighbors
-from edgel.parallel import kernel
-
-# Below this share of the largest variance the middle one is rounding: the neighbours lie on a line, or on one spot.
-_FLAT = 1e-12
-
+from edgel.parallel import kernel, run_slices
+from edgel.planes import fit_slice
+from edgel.search import tree_of
 
 @dataclass(frozen=True, eq=False)
 class Normals:
@@ -115,7 +112,7 @@ def check_num_neighbors(num_neighbors: int, num_points: int) -> int:
 
 
 def plane_fits(index: NeighborIndex, xyz: np.ndarray, num_neighbors: int) -> Normals:
-    """Fit planes to the k nearest neighbours of (M, 3) finite positions; the normals' signs are arbitrary."""
+    """Fit planes to the k nearest neighbours of (M, 3) finite positions; the normals look upwards (+Z)."""
     k = check_num_neighbors(num_neighbors, len(index))
     if len(xyz) == 0:
         return Normals(np.empty((0, 3)), np.empty(0), np.empty(0), np.empty(0))
@@ -123,21 +120,19 @@ def plane_fits(index: NeighborIndex, xyz: np.ndarray, num_neighbors: int) -> Nor
 
 
 def fit_planes(index: NeighborIndex, queries: NeighborIndex, num_neighbors: int) -> Normals:
-    """Fit planes at sorted queries, which may be the index itself; results in the queries' own order."""
-    planes = np.empty((len(queries), 6))
-    visit_neighbors(_fit_planes, queries, index, num_neighbors, planes)
-    normals = np.ascontiguousarray(planes[:, :3])
-    return Normals(normals, planes[:, 3].copy(), planes[:, 4].copy(), planes[:, 5].copy())
+    """Fit planes at sorted queries, which may be the index itself; normals upwards, rows in the queries' own order."""
+    count, leaves = len(queries), len(queries.boxes) // 2
+    planes = Normals(np.empty((count, 3)), np.empty(count), np.empty(count), np.empty(count))
+    results = (planes.normals, planes.offset, planes.residual, planes.variation)
+    at = (leaves, queries.xyz, queries.order, tree_of(index), num_neighbors)
+    run_slices(fit_slice, leaves, *at, *results, size=256)
+    return planes
 
 
 def towards(planes: Normals, xyz: np.ndarray, viewpoint: np.ndarray | None) -> Normals:
-    """Turn the normals at (M, 3) positions towards a viewpoint (3,), or upwards (+Z) when it is None."""
+    """Turn the upward normals of `fit_planes` at (M, 3) positions towards a viewpoint (3,), unless it is None."""
     if viewpoint is None:
-        n = planes.normals
-        # A vertical face is seen from no side from above: then +Y, then +X decides, so that the sign is not left to
-        # rounding in the eigenvector.
-        down = (n[:, 2] < 0) | ((n[:, 2] == 0) & ((n[:, 1] < 0) | ((n[:, 1] == 0) & (n[:, 0] < 0))))
-        return planes.flipped(down)
+        return planes
     return planes.flipped(((viewpoint - xyz) * planes.normals).sum(axis=1) < 0)
 
 
@@ -216,34 +211,3 @@ def _orthogonal_to_largest(a, xy, xz, b, yz, c):
     if length == 0.0:
         return 0.0, 0.0, 1.0
     return x / length, y / length, z / length
-
-
-@kernel
-def _fit_planes(first, places, squared, queries, query_order, xyz, planes):
-    k = places.shape[1]
-    for q in range(places.shape[0]):
-        # Sums are taken about the query, so that they keep their digits far from the origin.
-        x, y, z = queries[0, first + q], queries[1, first + q], queries[2, first + q]
-        mx, my, mz = 0.0, 0.0, 0.0
-        for i in range(k):
-            mx += xyz[0, places[q, i]] - x
-            my += xyz[1, places[q, i]] - y
-            mz += xyz[2, places[q, i]] - z
-        mx, my, mz = mx / k, my / k, mz / k
-        xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for i in range(k):
-            dx = xyz[0, places[q, i]] - x - mx
-            dy = xyz[1, places[q, i]] - y - my
-            dz = xyz[2, places[q, i]] - z - mz
-            xx, xy, xz = xx + dx * dx, xy + dx * dy, xz + dx * dz
-            yy, yz, zz = yy + dy * dy, yz + dy * dz, zz + dz * dz
-        smallest, middle, nx, ny, nz = smallest_eigenpair(xx, xy, xz, yy, yz, zz)
-        trace = xx + yy + zz
-        plane = planes[query_order[first + q]]
-        if middle <= _FLAT * trace:
-            plane[:] = np.nan
-            continue
-        plane[0], plane[1], plane[2] = nx, ny, nz
-        plane[3] = nx * (x + mx) + ny * (y + my) + nz * (z + mz)
-        plane[4] = max(smallest, 0.0)
-        plane[5] = max(smallest, 0.0) / trace

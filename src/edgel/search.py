@@ -1,0 +1,349 @@
+"""Search the k nearest of eight queries in step, one in each lane.
+
+What a group of queries may need is gathered once: the blocks of eight points within reach of all of them. Their squared
+distances are computed without a branch, and the k smallest of each lane are told from the others by a threshold, which
+is found by counting: nothing is sorted. The reach is a guess from the group before; a lane that finds fewer than k
+within it has the group searched again, farther.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from edgel.kdtree import NeighborIndex, node_start
+from edgel.lanes import (
+    LANES,
+    as_floats,
+    bits,
+    counted,
+    counts_of,
+    larger,
+    largest_of,
+    load,
+    smallest_of,
+    spread,
+    store,
+    where,
+    where_counts,
+)
+from edgel.parallel import kernel
+
+CHUNK = 16  # leaves of queries that look at the tree together
+_SLACK = 1.25  # squared reach over that of the group before
+_NEAR = 2048  # most blocks near a chunk; queries that lie wider apart look at the tree by themselves
+_FEW = 192  # most blocks near eight queries; such as lie wider apart are searched alone
+_ROUNDS = 20  # after so many counts a lane's k-th and next distance are taken to be equal
+
+
+class Tree(NamedTuple):
+    """The arrays of a `NeighborIndex`, as kernels take them."""
+
+    xyz: np.ndarray
+    order: np.ndarray
+    boxes: np.ndarray
+    blocks: np.ndarray
+
+
+def tree_of(index: NeighborIndex) -> Tree:
+    """Return the arrays of an index."""
+    return Tree(index.xyz, index.order, index.boxes, index.blocks)
+
+
+class Room(NamedTuple):
+    """Where a search keeps what it has found.
+
+    Attributes
+    ----------
+    near, near_boxes : (M,) int64, (6 M,) float64
+        Blocks near a chunk, and their boxes, a row each of lower x, y, z, upper x, y, z.
+    found : (M,) int64
+        Blocks near eight queries, ascending.
+    squared : (64 M,) float64
+        Squared distances of each point of those blocks from the eight queries.
+    queries : (24,) float64
+        x, y, z of the eight queries.
+    limits : (8,) float64
+        Squared distance up to which points are among the k nearest of each.
+    """
+
+    near: np.ndarray
+    near_boxes: np.ndarray
+    found: np.ndarray
+    squared: np.ndarray
+    queries: np.ndarray
+    limits: np.ndarray
+
+
+@kernel
+def make_room():
+    """Make room for a search."""
+    return _with_room_for(_FEW, np.empty(_NEAR, np.int64), np.empty(6 * _NEAR))
+
+
+@kernel
+def _with_room_for(found, near, near_boxes):
+    squared = np.empty(LANES * LANES * found)
+    return Room(near, near_boxes, np.empty(found, np.int64), squared, np.empty(3 * LANES), np.empty(LANES))
+
+
+@kernel
+def _box_distance(boxes, node, low_x, low_y, low_z, high_x, high_y, high_z):
+    """Squared distance between a node's box and another box."""
+    dx = max(boxes[node, 0] - high_x, low_x - boxes[node, 3], 0.0)
+    dy = max(boxes[node, 1] - high_y, low_y - boxes[node, 4], 0.0)
+    dz = max(boxes[node, 2] - high_z, low_z - boxes[node, 5], 0.0)
+    return dx * dx + dy * dy + dz * dz
+
+
+@kernel
+def _walk(tree, low_x, low_y, low_z, high_x, high_y, high_z, reach, found):
+    """List the blocks of the leaves within a squared reach of a box, ascending; -1 if they are too many."""
+    boxes, num_points = tree.boxes, tree.xyz.shape[1]
+    leaves, count, depth = boxes.shape[0] // 2, 0, 1
+    stack = np.empty(64, np.int64)
+    stack[0] = 1
+    while depth > 0:
+        depth -= 1
+        node = stack[depth]
+        if _box_distance(boxes, node, low_x, low_y, low_z, high_x, high_y, high_z) > reach:
+            continue
+        if node < leaves:
+            stack[depth], stack[depth + 1] = 2 * node + 1, 2 * node
+            depth += 2
+            continue
+        first = node_start(node - leaves, num_points, leaves)
+        last = node_start(node - leaves + 1, num_points, leaves)
+        for block in range(first // LANES, (last + LANES - 1) // LANES):
+            if count == len(found):
+                return -1
+            found[count] = block
+            count += 1
+    return count
+
+
+@kernel
+def _sure_reach(tree, low_x, low_y, low_z, high_x, high_y, high_z, k):
+    """Squared distance within which a box has k points for sure: all of some node that lies near it."""
+    boxes, num_points = tree.boxes, tree.xyz.shape[1]
+    leaves, node, nodes = boxes.shape[0] // 2, 1, 1
+    while node < leaves:
+        near = _box_distance(boxes, 2 * node, low_x, low_y, low_z, high_x, high_y, high_z)
+        far = _box_distance(boxes, 2 * node + 1, low_x, low_y, low_z, high_x, high_y, high_z)
+        child, nodes = 2 * node + (far < near), 2 * nodes
+        place = child - nodes
+        if node_start(place + 1, num_points, nodes) - node_start(place, num_points, nodes) < k:
+            break
+        node = child
+    dx = max(boxes[node, 3] - low_x, high_x - boxes[node, 0])
+    dy = max(boxes[node, 4] - low_y, high_y - boxes[node, 1])
+    dz = max(boxes[node, 5] - low_z, high_z - boxes[node, 2])
+    return dx * dx + dy * dy + dz * dz
+
+
+@kernel
+def _look_round(tree, queries, first, last, reach, room):
+    """Gather the blocks near the queries first..last-1; returns how many, filled up to eights, or -1."""
+    low_x, low_y, low_z = np.inf, np.inf, np.inf
+    high_x, high_y, high_z = -np.inf, -np.inf, -np.inf
+    for q in range(first, last):
+        low_x, high_x = min(low_x, queries[0, q]), max(high_x, queries[0, q])
+        low_y, high_y = min(low_y, queries[1, q]), max(high_y, queries[1, q])
+        low_z, high_z = min(low_z, queries[2, q]), max(high_z, queries[2, q])
+    near, boxes = room.near, room.near_boxes
+    count = _walk(tree, low_x, low_y, low_z, high_x, high_y, high_z, reach, near[: len(near) - LANES])
+    if count < 0:
+        return -1
+    size = len(near)
+    for i in range(count):
+        for side in range(6):
+            boxes[side * size + i] = tree.blocks[side, near[i]]
+    whole = (count + LANES - 1) // LANES * LANES
+    for i in range(count, whole):  # nowhere
+        near[i] = 0
+        for side in range(6):
+            boxes[side * size + i] = np.inf if side < 3 else -np.inf
+    return whole
+
+
+@kernel
+def _pick(room, near, low_x, low_y, low_z, high_x, high_y, high_z, reach):
+    """List those blocks near a chunk that are near a box in it, ascending; -1 if they are too many."""
+    boxes, found, size, count = room.near_boxes, room.found, len(room.near), 0
+    for i in range(0, near, LANES):
+        dx = larger(larger(load(boxes, i) - high_x, low_x - load(boxes, 3 * size + i)), spread(0.0))
+        dy = larger(larger(load(boxes, size + i) - high_y, low_y - load(boxes, 4 * size + i)), spread(0.0))
+        dz = larger(larger(load(boxes, 2 * size + i) - high_z, low_z - load(boxes, 5 * size + i)), spread(0.0))
+        inside = bits(dx * dx + dy * dy + dz * dz <= reach)
+        if count + LANES > len(found):
+            return -1
+        for lane in range(LANES):
+            found[count] = room.near[i + lane]  # written in any case: no branch to guess
+            count += (inside >> lane) & 1
+    return count
+
+
+@kernel
+def _measure(tree, room, count, reach):
+    """Compute the squared distances of the blocks found; returns how many of each lane are within reach."""
+    x, y, z, squared, found = tree.xyz[0], tree.xyz[1], tree.xyz[2], room.squared, room.found
+    num_points = len(x)
+    qx, qy, qz = load(room.queries, 0), load(room.queries, LANES), load(room.queries, 2 * LANES)
+    within = counts_of(0)
+    for i in range(count):
+        first = LANES * found[i]
+        if first + LANES > num_points:  # the last, not a whole one
+            for j in range(LANES):
+                store(squared, (i * LANES + j) * LANES, spread(np.inf))
+        for j in range(min(LANES, num_points - first)):
+            dx, dy, dz = x[first + j] - qx, y[first + j] - qy, z[first + j] - qz
+            d = dx * dx + dy * dy + dz * dz
+            store(squared, (i * LANES + j) * LANES, d)
+            within = counted(within, d <= reach)
+    return within
+
+
+@kernel
+def _divide(room, count, k, reach, within, guess):
+    """Find the limit of each lane within which exactly k points lie, by counting; returns which lanes have one.
+
+    The counts grow about evenly with the squared distance on a surface, so the next limit to try is interpolated.
+    """
+    squared = room.squared
+    low, high, fewer, more = spread(-1.0), spread(reach), counts_of(0), within
+    limit = spread(guess)
+    for step in range(_ROUNDS):
+        if bits(more == k) == 255:
+            break
+        inside = counts_of(0)
+        for i in range(0, count * LANES * LANES, LANES):
+            inside = counted(inside, load(squared, i) <= limit)
+        enough = inside >= k
+        low, fewer = where(enough, low, limit), where_counts(enough, fewer, inside)
+        high, more = where(enough, limit, high), where_counts(enough, inside, more)
+        share = (k + 0.5 - as_floats(fewer)) / (as_floats(more) - as_floats(fewer))
+        share = share if step % 3 < 2 else spread(0.5)
+        limit = where(more == k, high, low + (high - low) * share)
+    store(room.limits, 0, where(more == k, high, low))
+    return bits(more == k)
+
+
+@kernel
+def first_of(tree, a, b):
+    """Whether sorted point a comes before b by x, y, z; duplicates by their row in the input."""
+    for axis in range(3):
+        if tree.xyz[axis, a] != tree.xyz[axis, b]:
+            return tree.xyz[axis, a] < tree.xyz[axis, b]
+    return tree.order[a] < tree.order[b]
+
+
+@kernel
+def place_of(room, i):
+    """Sorted place of the i-th point of the blocks found."""
+    return LANES * room.found[i // LANES] + i % LANES
+
+
+@kernel
+def _settle(tree, room, count, k, lane):
+    """Where the k-th distance equals the next one, leave only the points of smallest coordinates within the limit."""
+    squared, low, missing = room.squared, room.limits[lane], k
+    for i in range(count * LANES):
+        missing -= squared[i * LANES + lane] <= low
+    last, limit = -1, low
+    for _ in range(missing):
+        best, least = -1, np.inf
+        for i in range(count * LANES):
+            d = squared[i * LANES + lane]
+            if d <= low or d > least or d < limit:
+                continue
+            if d == limit and last >= 0 and not first_of(tree, place_of(room, last), place_of(room, i)):
+                continue
+            if d < least or best < 0 or first_of(tree, place_of(room, i), place_of(room, best)):
+                best, least = i, d
+        last, limit = best, least
+    for i in range(count * LANES):
+        if (
+            squared[i * LANES + lane] == limit
+            and i != last
+            and not first_of(tree, place_of(room, i), place_of(room, last))
+        ):
+            squared[i * LANES + lane] = np.inf
+    room.limits[lane] = limit
+
+
+@kernel
+def _search(tree, room, near, near_reach, reach, k):
+    """Find the k nearest of the queries in `room`: see `nearest_of_eight`."""
+    qx, qy, qz = load(room.queries, 0), load(room.queries, LANES), load(room.queries, 2 * LANES)
+    low_x, low_y, low_z = smallest_of(qx), smallest_of(qy), smallest_of(qz)
+    high_x, high_y, high_z = largest_of(qx), largest_of(qy), largest_of(qz)
+    guess = reach / _SLACK
+    for attempt in range(3):
+        if attempt == 2 or not reach < np.inf:
+            reach = _sure_reach(tree, low_x, low_y, low_z, high_x, high_y, high_z, k)
+        if reach <= near_reach:
+            count = _pick(room, near, low_x, low_y, low_z, high_x, high_y, high_z, reach)
+        else:
+            count = _walk(tree, low_x, low_y, low_z, high_x, high_y, high_z, reach, room.found)
+        if count < 0:
+            return -1, reach
+        within = _measure(tree, room, count, reach)
+        if bits(within >= k) == 255:
+            break
+        reach *= 2.0
+    settled = _divide(room, count, k, reach, within, min(guess, 0.5 * reach))
+    for lane in range(LANES):
+        if not (settled >> lane) & 1:
+            _settle(tree, room, count, k, lane)
+    return count, _SLACK * largest_of(load(room.limits, 0))
+
+
+@kernel
+def look_round(tree, queries, first, last, reach, room):
+    """Gather the blocks near the queries first..last-1, which lie together, for `nearest_of_eight`.
+
+    Returns
+    -------
+    near, near_reach
+        How many they are, and the squared reach up to which they are all there are.
+    """
+    if not reach < np.inf:
+        return 0, -1.0
+    reach *= _SLACK
+    near = _look_round(tree, queries, first, last, reach, room)
+    return (near, reach) if near >= 0 else (0, -1.0)
+
+
+@kernel
+def nearest_of_eight(tree, queries, first, last, begin, near, near_reach, reach, k, room):
+    """Find the k nearest of the next queries of first..last-1, from `begin` on.
+
+    Returns
+    -------
+    size : int
+        How many queries were answered: eight unless fewer are left, or one where they lie too far apart.
+    count : int
+        How many blocks were found. Point j of block i is among the k nearest of the query in a lane where
+        ``room.squared[(8 i + j) 8 + lane] <= room.limits[lane]``; always exactly k are.
+    reach : float
+        Squared reach that the next queries may need.
+    room : Room
+        The one given, or a larger one.
+    """
+    size = min(LANES, last - begin)
+    if (begin - first) % LANES == 0:
+        for lane in range(LANES):
+            for axis in range(3):
+                room.queries[axis * LANES + lane] = queries[axis, begin + min(lane, size - 1)]
+        count, farther = _search(tree, room, near, near_reach, reach, k)
+        if count >= 0:
+            return size, count, farther, room
+    count, farther = -1, reach
+    while count < 0:
+        for axis in range(3):
+            room.queries[axis * LANES : (axis + 1) * LANES] = queries[axis, begin]
+        count, farther = _search(tree, room, 0, -1.0, reach, k)
+        if count < 0:  # many points within the least distance there is
+            room = _with_room_for(4 * len(room.found), room.near, room.near_boxes)
+    return 1, count, farther, room
