@@ -197,11 +197,12 @@ def _value_at(rank, keys, first, count, room):
         for i in range(_SAMPLE):
             sample[i] = source[start + i * kept // _SAMPLE]
         middle = (rank - below) * _SAMPLE // kept
-        near, far = _ranked(sample, _SAMPLE, max(middle - _SPREAD, 0), min(middle + _SPREAD, _SAMPLE - 1))
+        near, far = _ranked(sample, len(sample), max(middle - _SPREAD, 0), min(middle + _SPREAD, _SAMPLE - 1))
         far = np.nextafter(far, np.inf)
         under, between = _kept(source, start, kept, near, far, room)
         if between == kept:  # many equal keys
-            near, _ = _ranked(sample, _SAMPLE, _SAMPLE // 2, 0)
+            half = len(sample) // 2
+            near, _ = _ranked(sample, len(sample), half, half)
             far = np.nextafter(near, np.inf)
             under, between = _kept(keys, first, count, near, far, room)
             under -= below
@@ -216,7 +217,7 @@ def _value_at(rank, keys, first, count, room):
         else:
             low = far
         below, kept = _kept(keys, first, count, low, high, room)
-    return _ranked(room, kept, rank - below, 0)[0]
+    return _ranked(room, kept, rank - below, rank - below)[0]
 
 
 @kernel

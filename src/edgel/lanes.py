@@ -99,6 +99,7 @@ def _operator(function: Callable[..., Any], result: Any, operand: Any, build: Ca
 
 
 _operator(operator.add, floats, floats, lambda builder, a, b: builder.fadd(a, b))
+_operator(operator.add, counts, counts, lambda builder, a, b: builder.add(a, b))
 _operator(operator.sub, floats, floats, lambda builder, a, b: builder.fsub(a, b))
 _operator(operator.mul, floats, floats, lambda builder, a, b: builder.fmul(a, b))
 _operator(operator.truediv, floats, floats, lambda builder, a, b: builder.fdiv(a, b))

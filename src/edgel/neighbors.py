@@ -15,7 +15,7 @@ import numpy as np
 from edgel.kdtree import NeighborIndex, build_index, node_start
 from edgel.lanes import LANES, as_floats, bits, counted, counts_of, load, store
 from edgel.parallel import kernel, run_slices
-from edgel.search import CHUNK, first_of, look_round, make_room, nearest_of_eight, tree_of
+from edgel.search import CHUNK, first_of, larger_room, look_round, make_room, nearest_of_eight, tree_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,35 +75,36 @@ def visit_neighbors(
     num_neighbors : int
         k.
     """
-    leaves, tree = len(queries.boxes) // 2, tree_of(index)
+    leaves, asked, tree = len(queries.boxes) // 2, tree_of(queries), tree_of(index)
 
     def work(start: int, stop: int) -> None:
         first, last = node_start(start, len(queries), leaves), node_start(stop, len(queries), leaves)
         places = np.empty((last - first, num_neighbors), np.int64)
         squared = np.empty((last - first, num_neighbors))
-        _list(start, stop, leaves, queries.xyz, tree, places, squared)
+        _list(start, stop, asked, tree, places, squared)
         visit(first, places, squared, queries.xyz, queries.order, index.xyz, *arguments)
 
     run_slices(work, leaves, size=256)
 
 
 @kernel
-def _list(start, stop, leaves, queries, tree, places, squared):
+def _list(start, stop, queries, tree, places, squared):
     """List the k nearest of the queries in leaves start..stop-1 of their own tree, nearest first."""
     room, reach, k = make_room(), np.inf, places.shape[1]
-    base = node_start(start, queries.shape[1], leaves)
+    num_queries, leaves = len(queries.order), len(queries.boxes) // 2
+    base = node_start(start, num_queries, leaves)
     size_of_lists = (k + LANES - 1) // LANES * LANES
     distances, ranks = np.empty(size_of_lists + 1), np.empty(size_of_lists)
     points = np.empty(size_of_lists + 1, np.int64)
     for leaf in range(start, stop, CHUNK):
-        first = node_start(leaf, queries.shape[1], leaves)
-        last = node_start(min(leaf + CHUNK, stop), queries.shape[1], leaves)
+        first = node_start(leaf, num_queries, leaves)
+        last = node_start(min(leaf + CHUNK, stop), num_queries, leaves)
         near, near_reach = look_round(tree, queries, first, last, reach, room)
         begin = first
         while begin < last:
-            size, count, reach, room = nearest_of_eight(
-                tree, queries, first, last, begin, near, near_reach, reach, k, room
-            )
+            size, count, reach = nearest_of_eight(tree, queries, first, last, begin, near, near_reach, reach, k, room)
+            if size == 0:
+                room = larger_room(room)
             for lane in range(size):
                 _take(room, count, lane, points, distances)
                 q = begin + lane - base

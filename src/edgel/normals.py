@@ -14,6 +14,9 @@ from edgel.parallel import kernel, run_slices
 from edgel.planes import fit_slice
 from edgel.search import tree_of
 
+_SLICE = 1024  # leaves of queries: the first chunk of a slice has no neighbour to guess its reach from
+
+
 @dataclass(frozen=True, eq=False)
 class Normals:
     """Best-fit planes ``normal . p = offset`` of the points asked for, in their order.
@@ -124,8 +127,7 @@ def fit_planes(index: NeighborIndex, queries: NeighborIndex, num_neighbors: int)
     count, leaves = len(queries), len(queries.boxes) // 2
     planes = Normals(np.empty((count, 3)), np.empty(count), np.empty(count), np.empty(count))
     results = (planes.normals, planes.offset, planes.residual, planes.variation)
-    at = (leaves, queries.xyz, queries.order, tree_of(index), num_neighbors)
-    run_slices(fit_slice, leaves, *at, *results, size=256)
+    run_slices(fit_slice, leaves, tree_of(queries), tree_of(index), num_neighbors, *results, size=_SLICE)
     return planes
 
 

@@ -22,6 +22,12 @@ def kernel(function: F) -> F:
     return njit(nogil=True, cache=True)(function)  # pyright: ignore[reportReturnType]
 
 
+def part(function: F) -> F:
+    """Compile a part of kernels, into which it is inlined (each array passed costs seven words); Python can't call it."""
+    compiled = njit(nogil=True, cache=True, forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    return compiled(function)  # pyright: ignore[reportReturnType]
+
+
 def num_threads() -> int:
     """Return how many threads kernels use: ``EDGEL_NUM_THREADS``, or the cores this process may run on."""
     asked = os.environ.get("EDGEL_NUM_THREADS", "")

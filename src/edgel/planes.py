@@ -17,30 +17,30 @@ from edgel.lanes import (
     store,
     where,
 )
-from edgel.parallel import kernel
-from edgel.search import CHUNK, look_round, make_room, nearest_of_eight
+from edgel.parallel import kernel, part
+from edgel.search import CHUNK, larger_room, look_round, make_room, nearest_of_eight
 
 # Below this share of the largest variance the middle one is rounding: the neighbours lie on a line, or on one spot.
 _FLAT = 1e-12
 
 
 @kernel
-def fit_slice(start, stop, leaves, queries, query_order, tree, k, normals, offset, residual, variation):
+def fit_slice(start, stop, queries, tree, k, normals, offset, residual, variation):
     """Fit planes at the queries of leaves start..stop-1 of their own tree; rows of the results are the queries' own."""
-    room = make_room()
-    planes, reach = np.empty(6 * LANES), np.inf
+    room, planes, reach = make_room(), np.empty(6 * LANES), np.inf
+    num_queries, leaves = len(queries.order), len(queries.boxes) // 2
     for leaf in range(start, stop, CHUNK):
-        first = node_start(leaf, queries.shape[1], leaves)
-        last = node_start(min(leaf + CHUNK, stop), queries.shape[1], leaves)
+        first = node_start(leaf, num_queries, leaves)
+        last = node_start(min(leaf + CHUNK, stop), num_queries, leaves)
         near, near_reach = look_round(tree, queries, first, last, reach, room)
         begin = first
         while begin < last:
-            size, count, reach, room = nearest_of_eight(
-                tree, queries, first, last, begin, near, near_reach, reach, k, room
-            )
+            size, count, reach = nearest_of_eight(tree, queries, first, last, begin, near, near_reach, reach, k, room)
+            if size == 0:
+                room = larger_room(room)
             _fit_eight(tree, room, count, k, planes)
             for lane in range(size):
-                row = query_order[begin + lane]
+                row = queries.order[begin + lane]
                 for axis in range(3):
                     normals[row, axis] = planes[axis * LANES + lane]
                 offset[row] = planes[3 * LANES + lane]
@@ -49,10 +49,10 @@ def fit_slice(start, stop, leaves, queries, query_order, tree, k, normals, offse
             begin += size
 
 
-@kernel
+@part
 def _fit_eight(tree, room, count, k, planes):
     """Fit planes to the neighbours found of eight queries: normal, offset, residual and variation, a row each."""
-    px, py, pz, squared, found = tree.xyz[0], tree.xyz[1], tree.xyz[2], room.squared, room.found
+    px, py, pz, squared, found = tree.x, tree.y, tree.z, room.squared, room.found
     x, y, z = load(room.queries, 0), load(room.queries, LANES), load(room.queries, 2 * LANES)
     limit, zero = load(room.limits, 0), spread(0.0)
     # Sums are taken about the query, so that they keep their digits far from the origin, and in the order of the tree,
@@ -87,14 +87,14 @@ def _fit_eight(tree, room, count, k, planes):
     store(planes, 5 * LANES, smallest / trace * sign * sign)
 
 
-@kernel
+@part
 def _longer(a, b, c, u, v, w):
     """The longer of two vectors in each lane."""
     second = u * u + v * v + w * w > a * a + b * b + c * c
     return where(second, u, a), where(second, v, b), where(second, w, c)
 
 
-@kernel
+@part
 def smallest_eigenpairs(xx, xy, xz, yy, yz, zz):
     """Smallest and middle eigenvalue of eight positive semidefinite 3 x 3 matrices, and unit eigenvectors of the former.
 
