@@ -24,6 +24,7 @@ from typing import Any
 
 from llvmlite import ir
 from numba.core import types
+from numba.core.errors import TypingError
 from numba.core.typeconv import Conversion
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
@@ -131,9 +132,15 @@ def _place(context: Any, builder: Any, kind: Any, array: Any, i: Any) -> Any:
     return builder.bitcast(builder.gep(data, [i]), Floats.llvm.as_pointer())
 
 
+def _check(array: Any) -> None:
+    if array.dtype != types.float64 or array.ndim != 1 or array.layout != "C":
+        raise TypingError(f"lanes are read from and written to contiguous (N,) float64, not {array}")
+
+
 @intrinsic
 def load(typing: Any, array: Any, i: Any) -> Any:
     """Read array[i : i + 8] of a contiguous (N,) float64."""
+    _check(array)
 
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return builder.load(_place(context, builder, sig.args[0], *args), align=8)
@@ -144,6 +151,7 @@ def load(typing: Any, array: Any, i: Any) -> Any:
 @intrinsic
 def store(typing: Any, array: Any, i: Any, values: Any) -> Any:
     """Write array[i : i + 8] of a contiguous (N,) float64."""
+    _check(array)
 
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         builder.store(args[2], _place(context, builder, sig.args[0], *args[:2]), align=8)

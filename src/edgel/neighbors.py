@@ -12,10 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from edgel.kdtree import NeighborIndex, build_index, node_start
+from edgel.kdtree import NeighborIndex, build_index
 from edgel.lanes import LANES, as_floats, bits, counted, counts_of, load, store
 from edgel.parallel import kernel, run_slices
-from edgel.search import CHUNK, first_of, larger_room, look_round, make_room, nearest_of_eight, tree_of
+from edgel.search import CHUNK, first_of, larger_room, look_round, make_room, nearest_of_eight, queries_of, tree_of
+
+_SLICE = 4096  # queries whose neighbours exist at a time, for each thread
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,30 +77,25 @@ def visit_neighbors(
     num_neighbors : int
         k.
     """
-    leaves, asked, tree = len(queries.boxes) // 2, tree_of(queries), tree_of(index)
+    asked, tree = queries_of(queries), tree_of(index)
 
     def work(start: int, stop: int) -> None:
-        first, last = node_start(start, len(queries), leaves), node_start(stop, len(queries), leaves)
-        places = np.empty((last - first, num_neighbors), np.int64)
-        squared = np.empty((last - first, num_neighbors))
+        places = np.empty((stop - start, num_neighbors), np.int64)
+        squared = np.empty((stop - start, num_neighbors))
         _list(start, stop, asked, tree, places, squared)
-        visit(first, places, squared, queries.xyz, queries.order, index.xyz, *arguments)
+        visit(start, places, squared, queries.xyz, queries.order, index.xyz, *arguments)
 
-    run_slices(work, leaves, size=256)
+    run_slices(work, len(queries), size=_SLICE)
 
 
 @kernel
 def _list(start, stop, queries, tree, places, squared):
-    """List the k nearest of the queries in leaves start..stop-1 of their own tree, nearest first."""
+    """List the k nearest of the queries start..stop-1, nearest first."""
     room, reach, k = make_room(), np.inf, places.shape[1]
-    num_queries, leaves = len(queries.order), len(queries.boxes) // 2
-    base = node_start(start, num_queries, leaves)
-    size_of_lists = (k + LANES - 1) // LANES * LANES
-    distances, ranks = np.empty(size_of_lists + 1), np.empty(size_of_lists)
-    points = np.empty(size_of_lists + 1, np.int64)
-    for leaf in range(start, stop, CHUNK):
-        first = node_start(leaf, num_queries, leaves)
-        last = node_start(min(leaf + CHUNK, stop), num_queries, leaves)
+    length = (k + LANES - 1) // LANES * LANES
+    distances, ranks, points = np.empty(length + 1), np.empty(length), np.empty(length + 1, np.int64)
+    for first in range(start, stop, CHUNK):
+        last = min(first + CHUNK, stop)
         near, near_reach = look_round(tree, queries, first, last, reach, room)
         begin = first
         while begin < last:
@@ -107,7 +104,7 @@ def _list(start, stop, queries, tree, places, squared):
                 room = larger_room(room)
             for lane in range(size):
                 _take(room, count, lane, points, distances)
-                q = begin + lane - base
+                q = begin + lane - start
                 _rank(tree, points, distances, ranks, places[q], squared[q])
             begin += size
 

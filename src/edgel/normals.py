@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,9 @@ from edgel.cloud import as_cloud, as_vector, check_points, check_rows
 from edgel.kdtree import NeighborIndex, build_index
 from edgel.parallel import kernel, run_slices
 from edgel.planes import fit_slice
-from edgel.search import tree_of
+from edgel.search import Queries, Tree, queries_of, tree_of
 
-_SLICE = 1024  # leaves of queries: the first chunk of a slice has no neighbour to guess its reach from
+_SLICE = 8192  # queries: the first chunk of a slice has none before it to guess its reach from
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,10 +50,20 @@ class Normals:
         """Return the planes of some rows."""
         return Normals(self.normals[rows], self.offset[rows], self.residual[rows], self.variation[rows])
 
+    def put(self, rows: np.ndarray, planes: Normals) -> None:
+        """Overwrite the planes of some rows."""
+        for each in fields(self):
+            getattr(self, each.name)[rows] = getattr(planes, each.name)
+
     def flipped(self, where: np.ndarray) -> Normals:
         """Return the same planes with the normals of a (M,) mask turned round."""
         sign = np.where(where, -1.0, 1.0)
         return replace(self, normals=self.normals * sign[:, None], offset=self.offset * sign)
+
+
+def no_planes(count: int) -> Normals:
+    """Return that many planes, all still undefined."""
+    return Normals(np.full((count, 3), np.nan), *(np.full(count, np.nan) for _ in range(3)))
 
 
 def estimate_normals(points: Any, *, at: Any = None, num_neighbors: int = 16, viewpoint: Any = None) -> Normals:
@@ -118,16 +128,43 @@ def plane_fits(index: NeighborIndex, xyz: np.ndarray, num_neighbors: int) -> Nor
     """Fit planes to the k nearest neighbours of (M, 3) finite positions; the normals look upwards (+Z)."""
     k = check_num_neighbors(num_neighbors, len(index))
     if len(xyz) == 0:
-        return Normals(np.empty((0, 3)), np.empty(0), np.empty(0), np.empty(0))
+        return no_planes(0)
     return fit_planes(index, build_index(xyz), k)
 
 
 def fit_planes(index: NeighborIndex, queries: NeighborIndex, num_neighbors: int) -> Normals:
     """Fit planes at sorted queries, which may be the index itself; normals upwards, rows in the queries' own order."""
-    count, leaves = len(queries), len(queries.boxes) // 2
+    return _fit(tree_of(index), queries_of(queries), num_neighbors, np.empty(0))
+
+
+def plane_fits_within(
+    index: NeighborIndex, places: np.ndarray, rows: np.ndarray, num_neighbors: int
+) -> tuple[Normals, np.ndarray]:
+    """Fit planes at some of an index' own points.
+
+    Parameters
+    ----------
+    places : (M,) int64
+        Places of the points in the index, ascending.
+    rows : (M,) int64
+        Where the results of each go: a permutation.
+
+    Returns
+    -------
+    Normals
+    (M,) float64
+        Distance within which the neighbours of each lie.
+    """
+    limits = np.empty(len(rows))
+    planes = _fit(tree_of(index), Queries(*index.xyz.take(places, axis=1), rows), num_neighbors, limits)
+    return planes, np.sqrt(limits)
+
+
+def _fit(tree: Tree, queries: Queries, num_neighbors: int, limits: np.ndarray) -> Normals:
+    count = len(queries.rows)
     planes = Normals(np.empty((count, 3)), np.empty(count), np.empty(count), np.empty(count))
     results = (planes.normals, planes.offset, planes.residual, planes.variation)
-    run_slices(fit_slice, leaves, tree_of(queries), tree_of(index), num_neighbors, *results, size=_SLICE)
+    run_slices(fit_slice, count, queries, tree, num_neighbors, *results, limits, size=_SLICE)
     return planes
 
 
@@ -147,12 +184,9 @@ def _spread(planes: Normals, wanted: np.ndarray) -> Normals:
     """Put planes into the rows of a mask, NaN elsewhere."""
     if wanted.all():
         return planes
-    full = {}
-    for name in ("normals", "offset", "residual", "variation"):
-        values = getattr(planes, name)
-        full[name] = np.full((len(wanted), *values.shape[1:]), np.nan)
-        full[name][wanted] = values
-    return Normals(**full)
+    full = no_planes(len(wanted))
+    full.put(np.flatnonzero(wanted), planes)
+    return full
 
 
 @kernel

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from edgel.kdtree import node_start
 from edgel.lanes import (
     LANES,
     larger,
@@ -25,13 +24,14 @@ _FLAT = 1e-12
 
 
 @kernel
-def fit_slice(start, stop, queries, tree, k, normals, offset, residual, variation):
-    """Fit planes at the queries of leaves start..stop-1 of their own tree; rows of the results are the queries' own."""
+def fit_slice(start, stop, queries, tree, k, normals, offset, residual, variation, limits):
+    """Fit planes at the queries start..stop-1, and write them to their rows.
+
+    `limits` (M,) takes the squared distance within which the k nearest lie; it may be empty.
+    """
     room, planes, reach = make_room(), np.empty(6 * LANES), np.inf
-    num_queries, leaves = len(queries.order), len(queries.boxes) // 2
-    for leaf in range(start, stop, CHUNK):
-        first = node_start(leaf, num_queries, leaves)
-        last = node_start(min(leaf + CHUNK, stop), num_queries, leaves)
+    for first in range(start, stop, CHUNK):
+        last = min(first + CHUNK, stop)
         near, near_reach = look_round(tree, queries, first, last, reach, room)
         begin = first
         while begin < last:
@@ -40,12 +40,14 @@ def fit_slice(start, stop, queries, tree, k, normals, offset, residual, variatio
                 room = larger_room(room)
             _fit_eight(tree, room, count, k, planes)
             for lane in range(size):
-                row = queries.order[begin + lane]
+                row = queries.rows[begin + lane]
                 for axis in range(3):
                     normals[row, axis] = planes[axis * LANES + lane]
                 offset[row] = planes[3 * LANES + lane]
                 residual[row] = planes[4 * LANES + lane]
                 variation[row] = planes[5 * LANES + lane]
+                if len(limits):
+                    limits[row] = room.limits[lane]
             begin += size
 
 

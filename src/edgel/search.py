@@ -31,7 +31,7 @@ from edgel.lanes import (
 )
 from edgel.parallel import kernel, part
 
-CHUNK = 16  # leaves of queries that look at the tree together
+CHUNK = 128  # queries that look at the tree together
 _SLACK = 1.25  # squared reach over that of the group before
 _NEAR = 2048  # most blocks near a chunk; queries that lie wider apart look at the tree by themselves
 _FEW = 192  # most blocks near eight queries; such as lie wider apart are searched alone
@@ -50,9 +50,23 @@ class Tree(NamedTuple):
     blocks: np.ndarray
 
 
+class Queries(NamedTuple):
+    """Where neighbours are asked for, in an order in which consecutive ones lie together, and their rows."""
+
+    x: np.ndarray
+    y: np.ndarray
+    z: np.ndarray
+    rows: np.ndarray
+
+
 def tree_of(index: NeighborIndex) -> Tree:
     """Return the arrays of an index."""
     return Tree(*index.xyz, index.order, index.boxes, index.blocks)
+
+
+def queries_of(index: NeighborIndex) -> Queries:
+    """Return the sorted points of an index as queries."""
+    return Queries(*index.xyz, index.order)
 
 
 class Room(NamedTuple):
