@@ -17,6 +17,7 @@ LAYERS = [
     {"parallel", "stages", "lanes"},
     {"cloud"},
     {"kdtree"},
+    {"blocks"},
     {"search"},
     {"neighbors", "planes"},
     {"normals", "canny"},

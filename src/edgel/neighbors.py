@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from edgel.blocks import CHUNK, larger_room, look_round, make_room, queries_of, tree_of
 from edgel.kdtree import NeighborIndex, build_index
 from edgel.lanes import LANES, as_floats, bits, counted, counts_of, load, store
 from edgel.parallel import kernel, run_slices
-from edgel.search import CHUNK, first_of, larger_room, look_round, make_room, nearest_of_eight, queries_of, tree_of
+from edgel.search import first_of, nearest_of_eight
 
 _SLICE = 4096  # queries whose neighbours exist at a time, for each thread
 

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from edgel.blocks import Queries, Tree, queries_of, tree_of
 from edgel.cloud import as_cloud, as_vector, check_points, check_rows
 from edgel.kdtree import NeighborIndex, build_index
 from edgel.parallel import kernel, run_slices
 from edgel.planes import fit_slice
-from edgel.search import Queries, Tree, queries_of, tree_of
 
 _SLICE = 8192  # queries: the first chunk of a slice has none before it to guess its reach from
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from edgel.blocks import CHUNK, larger_room, look_round, make_room
 from edgel.lanes import (
     LANES,
     larger,
@@ -11,13 +12,12 @@ from edgel.lanes import (
     magnitude,
     multiply_add,
     root,
-    smaller,
     spread,
     store,
     where,
 )
 from edgel.parallel import kernel, part
-from edgel.search import CHUNK, larger_room, look_round, make_room, nearest_of_eight
+from edgel.search import nearest_of_eight
 
 # Below this share of the largest variance the middle one is rounding: the neighbours lie on a line, or on one spot.
 _FLAT = 1e-12
