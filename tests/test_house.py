@@ -16,6 +16,7 @@ ROOT = Path(edgel.__file__).parent
 LAYERS = [
     {"parallel", "stages", "lanes"},
     {"cloud"},
+    {"ranks"},
     {"kdtree"},
     {"blocks"},
     {"search"},

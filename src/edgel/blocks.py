@@ -78,11 +78,11 @@ class Room(NamedTuple):
 @kernel
 def make_room():
     """Make room for a search."""
-    return _with_room_for(_FEW, np.empty(_NEAR, np.int64), _aligned(6 * _NEAR))
+    return _with_room_for(_FEW, np.empty(_NEAR, np.int64), aligned(6 * _NEAR))
 
 
 @kernel
-def _aligned(size):
+def aligned(size):
     """Room that begins with a cache line: every eight that lie in two take twice as long."""
     room = np.empty(size + LANES)
     skip = -(room.ctypes.data // room.itemsize) % LANES
@@ -91,7 +91,7 @@ def _aligned(size):
 
 @kernel
 def _with_room_for(found, near, near_boxes):
-    squared = _aligned(LANES * LANES * found)
+    squared = aligned(LANES * LANES * found)
     return Room(near, near_boxes, np.empty(found, np.int64), squared, np.empty(3 * LANES), np.full(LANES, np.inf))
 
 

@@ -10,13 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel.lanes import LANES, counted, counts_of, larger, largest_of, load, smaller, smallest_of, spread, where
+from edgel.lanes import LANES, larger, largest_of, load, smaller, smallest_of, spread
 from edgel.parallel import kernel, run_slices
+from edgel.ranks import sort_leaf, sort_places, value_at
 
 BUCKET = 16  # most points a leaf holds
 _SHARED_LEVELS = 5  # levels split one after the other; below them each subtree fits a core's own cache
-_RANKED = 64  # so few keys are ranked by counting
-_SAMPLE, _SPREAD = 32, 4  # keys of a sample, and how many of them lie between the median and either end of a window
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,10 +65,8 @@ def build_index(xyz: np.ndarray) -> NeighborIndex:
     """
     count = len(xyz)
     depth = max(-(-count // BUCKET) - 1, 0).bit_length()
-    # Each level is split from one pair of arrays into the other; the last has to end in the first.
+    # Each level is split from one pair of arrays into the other, and then the leaves sorted into the other once more.
     here, there = [(_axes(count), np.empty(count, np.int64)) for _ in range(2)]
-    if depth % 2:
-        here, there = there, here
     run_slices(_load, count, xyz, *here, size=65536)
     boxes, blocks = np.empty((2 << depth, 6)), np.empty((6, -(-count // LANES)))
     shared = min(depth, _SHARED_LEVELS)
@@ -77,8 +74,7 @@ def build_index(xyz: np.ndarray) -> NeighborIndex:
         run_slices(_split_level, 1 << level, level, *here, *there, size=1)
         here, there = there, here
     run_slices(_split_subtrees, 1 << shared, shared, depth, *here, *there, boxes, blocks, size=1)
-    if (depth - shared) % 2:
-        here, there = there, here
+    here, there = (there, here) if (depth - shared) % 2 == 0 else (here, there)
     boxes[0] = 0.0
     _inner_boxes(1 << depth, boxes)
     return NeighborIndex(here[1], here[0], boxes, blocks)
@@ -153,74 +149,6 @@ def _box(xyz, first, last, box):
 
 
 @kernel
-def _ranked(keys, count, low_rank, high_rank):
-    """Values at two ranks of the first `count` keys, by counting how many are smaller than each.
-
-    The room of the keys goes on to a multiple of eight.
-    """
-    for p in range(count, (count + LANES - 1) // LANES * LANES):
-        keys[p] = np.inf
-    low, high = spread(-np.inf), spread(-np.inf)
-    for p in range(0, count, LANES):
-        v, less = load(keys, p), counts_of(0)
-        for q in range(count):
-            less = counted(less, v > keys[q])
-        low = larger(low, where(less <= low_rank, v, -np.inf))
-        high = larger(high, where(less <= high_rank, v, -np.inf))
-    return largest_of(low), largest_of(high)
-
-
-@kernel
-def _kept(source, first, count, low, high, room):
-    """Copy the keys from `low` on and below `high` to `room`; returns how many lie below `low`, how many between."""
-    below, kept = 0, 0
-    for p in range(first, first + count):
-        v = source[p]
-        room[kept] = v  # written in any case and overwritten by the next: no branch to guess
-        below += v < low
-        kept += (v >= low) & (v < high)
-    return below, kept
-
-
-@kernel
-def _value_at(rank, keys, first, count, room):
-    """Value that would lie at `rank` were keys[first : first + count] sorted; `room` holds as many, and 8 more.
-
-    Two values of a sample, which most likely lie on either side of it, leave a quarter of the keys (Floyd & Rivest
-    1975), and again, until they can be counted.
-    """
-    low, high = -np.inf, np.inf
-    below, kept = _kept(keys, first, count, low, high, room) if count <= _RANKED else (0, count)
-    source, start = keys, first
-    sample = np.empty(_SAMPLE)
-    while kept > _RANKED:
-        for i in range(_SAMPLE):
-            sample[i] = source[start + i * kept // _SAMPLE]
-        middle = (rank - below) * _SAMPLE // kept
-        near, far = _ranked(sample, len(sample), max(middle - _SPREAD, 0), min(middle + _SPREAD, _SAMPLE - 1))
-        far = np.nextafter(far, np.inf)
-        under, between = _kept(source, start, kept, near, far, room)
-        if between == kept:  # many equal keys
-            half = len(sample) // 2
-            near, _ = _ranked(sample, len(sample), half, half)
-            far = np.nextafter(near, np.inf)
-            under, between = _kept(keys, first, count, near, far, room)
-            under -= below
-        source, start = room, 0
-        if under <= rank - below < under + between:
-            low, high, below, kept = near, far, below + under, between
-            if np.nextafter(low, np.inf) == high:
-                return low
-            continue
-        if rank - below < under:
-            high = near
-        else:
-            low = far
-        below, kept = _kept(keys, first, count, low, high, room)
-    return _ranked(room, kept, rank - below, rank - below)[0]
-
-
-@kernel
 def _split_node(place, level, xyz, order, to_xyz, to_order, room, box):
     """Halve a node at the median of its widest axis, from one pair of arrays into the other."""
     count, nodes = xyz.shape[1], 1 << level
@@ -229,7 +157,7 @@ def _split_node(place, level, xyz, order, to_xyz, to_order, room, box):
     axis = _box(xyz, first, last, box)
     key, second, third = xyz[axis], xyz[(axis + 1) % 3], xyz[(axis + 2) % 3]
     to_key, to_second, to_third = to_xyz[axis], to_xyz[(axis + 1) % 3], to_xyz[(axis + 2) % 3]
-    pivot = _value_at(middle - first, key, first, last - first, room)
+    pivot = value_at(middle - first, key, first, last - first, room)
     left, right = first, last - 1
     for p in range(first, last):
         below = key[p] < pivot
@@ -246,26 +174,7 @@ def _split_node(place, level, xyz, order, to_xyz, to_order, room, box):
                 to_third[p], to_third[tied] = to_third[tied], to_third[p]
                 to_order[p], to_order[tied] = to_order[tied], to_order[p]
                 tied += 1
-        _sort(to_key, to_second, to_third, to_order, left, tied)
-
-
-@kernel
-def _sort(key, second, third, order, first, last):
-    """Sort places first..last-1 of four arrays by the first three (Shell 1959)."""
-    gap = 1
-    while 3 * gap + 1 < last - first:
-        gap = 3 * gap + 1
-    while gap > 0:
-        for p in range(first + gap, last):
-            a, b, c, row, to = key[p], second[p], third[p], order[p], p
-            while to - gap >= first:
-                q = to - gap
-                if key[q] < a or (key[q] == a and (second[q] < b or (second[q] == b and third[q] <= c))):
-                    break
-                key[to], second[to], third[to], order[to] = key[q], second[q], third[q], order[q]
-                to = q
-            key[to], second[to], third[to], order[to] = a, b, c, row
-        gap //= 3
+        sort_places(to_key, to_second, to_third, to_order, left, tied)
 
 
 @kernel
@@ -295,10 +204,10 @@ def _split_subtrees(start, stop, top, depth, xyz, order, other_xyz, other_order,
         for leaf in range(subtree << (depth - top), (subtree + 1) << (depth - top)):
             first, last = node_start(leaf, xyz.shape[1], leaves), node_start(leaf + 1, xyz.shape[1], leaves)
             axis = _box(here, first, last, boxes[leaves + leaf])
-            _sort(here[axis], here[(axis + 1) % 3], here[(axis + 2) % 3], rows, first, last)
+            sort_leaf(axis, here, rows, there, other_rows, first, last, room)
             for p in range(first, last, LANES):
                 for axis in range(3):
-                    low, high = _extent(here[axis], p, min(p + LANES, last))
+                    low, high = _extent(there[axis], p, min(p + LANES, last))
                     blocks[axis, p // LANES], blocks[3 + axis, p // LANES] = low, high
 
 

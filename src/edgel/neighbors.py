@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from edgel.blocks import CHUNK, larger_room, look_round, make_room, queries_of, tree_of
+from edgel.blocks import CHUNK, aligned, larger_room, look_round, make_room, queries_of, tree_of
 from edgel.kdtree import NeighborIndex, build_index
 from edgel.lanes import LANES, as_floats, bits, counted, counts_of, load, store
-from edgel.parallel import kernel, run_slices
+from edgel.parallel import kernel, part, run_slices
 from edgel.search import first_of, nearest_of_eight
 
 _SLICE = 4096  # queries whose neighbours exist at a time, for each thread
@@ -94,7 +94,7 @@ def _list(start, stop, queries, tree, places, squared):
     """List the k nearest of the queries start..stop-1, nearest first."""
     room, reach, k = make_room(), np.inf, places.shape[1]
     length = (k + LANES - 1) // LANES * LANES
-    distances, ranks, points = np.empty(length + 1), np.empty(length), np.empty(length + 1, np.int64)
+    distances, ranks, points = aligned(length + 1), aligned(length), np.empty(length + 1, np.int64)
     for first in range(start, stop, CHUNK):
         last = min(first + CHUNK, stop)
         near, near_reach = look_round(tree, queries, first, last, reach, room)
@@ -110,7 +110,7 @@ def _list(start, stop, queries, tree, places, squared):
             begin += size
 
 
-@kernel
+@part
 def _take(room, count, lane, points, distances):
     """Copy the places and squared distances of a lane's k nearest, in the order of the tree."""
     limit, kept = room.limits[lane], 0
@@ -122,7 +122,7 @@ def _take(room, count, lane, points, distances):
             kept += d <= limit
 
 
-@kernel
+@part
 def _rank(tree, points, distances, ranks, places, squared):
     """Sort a list of neighbours by distance, ties by coordinates: the rank of each is how many are nearer."""
     k = len(places)

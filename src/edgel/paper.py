@@ -26,8 +26,8 @@ TOLERANCE_SHARE = 0.018  # default tolerance, of the image's size: both of the p
 _STEP_RESPONSE = 4.0 * 255.0  # the Sobel magnitude of the largest step of grey, which is strength 1
 _MAX_PIXELS = 2**28
 # Pixels, in which neighbours are looked for first: just below three, so that three more on every side are enough. On a
-# level surface the 16 nearest reach 0.56 of the default pixel, on the steep sides of the paper's tee up to 3.7; with 0.99
-# two fifths of its edge points had to be tried again, with 2.99 one in 3,000.
+# level surface the 16 nearest reach 0.56 of the default pixel, on the steep sides of the paper's tee up to 3.7; with
+# 0.99 two fifths of its edge points had to be tried again, with 2.99 one in 3,000.
 _FIRST_REACH = 2.99
 
 

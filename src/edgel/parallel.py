@@ -23,7 +23,7 @@ def kernel(function: F) -> F:
 
 
 def part(function: F) -> F:
-    """Compile a part of kernels, into which it is inlined (each array passed costs seven words); Python can't call it."""
+    """Compile a part of kernels, which is inlined (an array passed costs seven words); Python cannot call it."""
     compiled = njit(nogil=True, cache=True, forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
     return compiled(function)  # pyright: ignore[reportReturnType]
 

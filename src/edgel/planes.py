@@ -21,6 +21,7 @@ from edgel.search import nearest_of_eight
 
 # Below this share of the largest variance the middle one is rounding: the neighbours lie on a line, or on one spot.
 _FLAT = 1e-12
+_EQUAL = 1e-7  # of the trace: eigenvalues nearer each other than that are not told apart
 
 
 @kernel
@@ -98,7 +99,7 @@ def _longer(a, b, c, u, v, w):
 
 @part
 def smallest_eigenpairs(xx, xy, xz, yy, yz, zz):
-    """Smallest and middle eigenvalue of eight positive semidefinite 3 x 3 matrices, and unit eigenvectors of the former.
+    """Smallest and middle eigenvalue of eight positive semidefinite matrices, and unit eigenvectors of the former.
 
     `edgel.normals.smallest_eigenpair` in step. There is no arccos in step, so Laguerre's method climbs to the smallest
     root of the characteristic polynomial instead, from 0; then Rayleigh quotients undo its rounding.
@@ -117,7 +118,8 @@ def smallest_eigenpairs(xx, xy, xz, yy, yz, zz):
         bend = 6.0 * smallest - 2.0 * trace
         under = larger(4.0 * slope * slope - 6.0 * value * bend, zero)
         below = slope + root(under)
-        smallest = smallest - where(below > tiny, 3.0 * value / larger(below, tiny), zero)
+        # Where two roots are equal but for rounding, both are near enough already, and the quotient would be noise.
+        smallest = smallest - where(below > _EQUAL, 3.0 * value / larger(below, tiny), zero)
     # A vector across the longest row of the matrix less its smallest eigenvalue: at rank 1, across the largest.
     a, b, c = xx - smallest, yy - smallest, zz - smallest
     u, v, w = _longer(a, xy, xz, xy, b, yz)
