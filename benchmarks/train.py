@@ -23,7 +23,7 @@ import training
 from edgel import evidence, metrics
 from edgel.evidence import Evidence, coarse
 from edgel.evidence.forest import Forest, evaluate, read_forests
-from edgel.kdtree import build_index
+from edgel.kdtree import build_index, leaf_starts
 
 CACHE = Path(__file__).parent / "cache" / "training"
 OUT = Path(evidence.__file__).parent / evidence.WEIGHTS
@@ -103,8 +103,8 @@ def skim(seed: int) -> tuple[np.ndarray, ...]:
     cloud, _ = evidence.census(index)
     share = np.where(edge, 1.0, SHARE_FAR)
     places = np.flatnonzero(counts & (np.random.default_rng(seed).random(len(edge)) < share))
-    leaves, _ = coarse.look(index)
-    starts = np.arange(len(leaves)) * len(index) // len(leaves)
+    leaves, _, _ = coarse.look(index)
+    starts = leaf_starts(index)[:-1]
     points, leaves = (
         np.concatenate([part, np.broadcast_to(cloud, (len(part), len(cloud)))], axis=1)
         for part in (evidence.describe(index, places), leaves)

@@ -16,7 +16,7 @@ from edgel.evidence.scales import SCALES, fit_scales
 from edgel.evidence.sectors import sector_gaps
 from edgel.evidence.sheets import fit_sheets
 from edgel.evidence.through import planes_through, span_planes
-from edgel.kdtree import build_index
+from edgel.kdtree import build_index, leaf_starts
 from edgel.neighbors import visit_neighbors
 
 
@@ -144,9 +144,9 @@ def test_context_hears_the_neighbours_along_and_beside_the_edge():
 def test_the_look_at_leaves_matches_numpy():
     xyz = neighbourhood(np.random.default_rng(1), count=500)
     index = build_index(xyz)
-    features, planes = coarse.look(index)
+    features, planes, near = coarse.look(index)
     leaves = len(features)
-    limits = np.arange(leaves + 1) * len(xyz) // leaves
+    limits = leaf_starts(index)
     points = [index.xyz[:, a:b].T for a, b in itertools.pairwise(limits)]
     middles = np.array([p.mean(axis=0) for p in points])
     for leaf in range(leaves):
@@ -154,6 +154,7 @@ def test_the_look_at_leaves_matches_numpy():
         assert abs(planes[leaf, :3] @ normal) == pytest.approx(1, abs=1e-7)
         assert planes[leaf, 3] == pytest.approx(math.exp(-variation / coarse.PLANAR), rel=1e-4)
         nearest = np.argsort(((middles - middles[leaf]) ** 2).sum(axis=1))
+        assert near[leaf].tolist() == nearest[: len(near[leaf])].tolist()
         size = math.sqrt(points[leaf].var(axis=0).sum())
         for g, count in enumerate(coarse.GROUPS):
             group = np.concatenate([points[i] for i in nearest[:count]])

@@ -14,10 +14,13 @@ import edgel
 ROOT = Path(edgel.__file__).parent
 # Each room may import from rooms on lines above its own, and from its own line.
 LAYERS = [
-    {"parallel", "stages"},
+    {"parallel", "stages", "lanes"},
     {"cloud"},
+    {"ranks"},
     {"kdtree"},
-    {"neighbors"},
+    {"blocks"},
+    {"search"},
+    {"neighbors", "planes"},
     {"normals", "canny", "chains"},
     {"project", "evidence", "edges", "raster", "color"},
     {"facets", "viewing"},

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial import KDTree
 
-from edgel.kdtree import bounds, build_index
+from edgel.kdtree import bounds, build_index, node_start
 from edgel.neighbors import knn
 
 # Few different coordinates, so that ties and duplicates are the rule.
@@ -109,7 +109,7 @@ def test_index_holds_every_point_once_and_its_boxes_hold_the_points(n):
     np.testing.assert_array_equal(upper, points.max(axis=0))
     leaves = len(index.boxes) // 2
     for leaf in np.random.default_rng(0).integers(0, leaves, 20):
-        inside = index.xyz[:, leaf * n // leaves : (leaf + 1) * n // leaves]
+        inside = index.xyz[:, node_start(leaf, n, leaves) : node_start(leaf + 1, n, leaves)]
         assert 0 < inside.shape[1] <= 16
         np.testing.assert_array_equal(index.boxes[leaves + leaf], np.r_[inside.min(axis=1), inside.max(axis=1)])
     np.testing.assert_array_equal(index.boxes[1], np.r_[lower, upper])

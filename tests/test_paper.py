@@ -111,11 +111,12 @@ def test_the_share_does_not_depend_on_the_density(scan, share):
 def test_normals_of_the_edges_are_those_of_the_surface(scan):
     found = paper.detect(scan.cloud)
     everywhere = by_offset(edgel.estimate_normals(scan.cloud))
-    np.testing.assert_array_equal(found.normals[:, 0], everywhere.normals[found.index])
+    # The same neighbours, added up in another order.
+    np.testing.assert_allclose(found.normals[:, 0], everywhere.normals[found.index], rtol=0, atol=1e-11)
     np.testing.assert_array_equal(found.planes.normals, found.normals[:, 0])
     assert np.isnan(found.normals[:, 1]).all()
     np.testing.assert_array_equal(found.position, scan.cloud.xyz[found.index])
-    np.testing.assert_array_equal(found.planes.offset, everywhere.offset[found.index])
+    np.testing.assert_allclose(found.planes.offset, everywhere.offset[found.index], rtol=1e-11)
     assert (found.planes.offset > 0).all()
     error = np.degrees(np.arccos(np.clip(np.abs((found.planes.normals * scan.normals[found.index]).sum(axis=1)), 0, 1)))
     assert np.median(error) < 5
@@ -256,7 +257,7 @@ def test_a_diagonal_line_has_edges_but_no_normals():
 def test_stages_are_timed_and_told():
     told = []
     found = paper.detect(_plane(1000), progress=told.append)
-    assert told == list(found.seconds) == ["projection", "canny", "back-projection", "index", "normals"]
+    assert told == list(found.seconds) == ["projection", "canny", "back-projection", "normals"]
     assert all(seconds >= 0 for seconds in found.seconds.values())
 
 

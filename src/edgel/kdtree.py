@@ -1,16 +1,18 @@
 """A balanced k-d tree laid out in place: the order of points in which neighbour queries are fast.
 
-Halving the widest axis at the median follows any density (a scan, a LiDAR sweep) and needs no cell size.
+Halving the widest axis at the median follows any density (a scan, a LiDAR sweep) and needs no cell size. Ties at a
+median go by the other axes, and leaves are sorted: the layout depends on the points alone, not on their order.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from edgel.lanes import LANES, larger, largest_of, load, smaller, smallest_of, spread
 from edgel.parallel import kernel, run_slices
+from edgel.ranks import sort_leaf, sort_places, value_at
 
 BUCKET = 16  # most points a leaf holds
 _SHARED_LEVELS = 5  # levels split one after the other; below them each subtree fits a core's own cache
@@ -28,12 +30,16 @@ class NeighborIndex:
         Sorted coordinates, one axis a row so that distances are computed by SIMD.
     boxes : (2 L, 6) float64
         Lower and upper corner of each node: node 1 is the root, node i has children 2 i and 2 i + 1, leaves begin at
-        L; leaf i holds the sorted points from ``i N // L`` to ``(i + 1) N // L``.
+        L; the sorted points of leaf i begin at ``node_start(i, N, L)``.
+    blocks : (6, ceil(N / 8)) float64
+        Lower and upper corner of every eight consecutive sorted points, whose cell they fill: leaves are sorted along
+        their widest axis.
     """
 
     order: np.ndarray
     xyz: np.ndarray
     boxes: np.ndarray
+    blocks: np.ndarray
 
     def __len__(self) -> int:
         return len(self.order)
@@ -58,17 +64,25 @@ def build_index(xyz: np.ndarray) -> NeighborIndex:
     (1000, (128, 6))
     """
     count = len(xyz)
-    by_axis = np.empty((3, count))
-    order = np.empty(count, np.int64)
-    run_slices(_load, count, xyz, by_axis, order, size=65536)
     depth = max(-(-count // BUCKET) - 1, 0).bit_length()
-    boxes = np.empty((2 << depth, 6))
+    # Each level is split from one pair of arrays into the other, and then the leaves sorted into the other once more.
+    here, there = [(_axes(count), np.empty(count, np.int64)) for _ in range(2)]
+    run_slices(_load, count, xyz, *here, size=65536)
+    boxes, blocks = np.empty((2 << depth, 6)), np.empty((6, -(-count // LANES)))
     shared = min(depth, _SHARED_LEVELS)
     for level in range(shared):
-        run_slices(_split_level, 1 << level, level, by_axis, order, size=1)
-    run_slices(_split_subtrees, 1 << shared, shared, depth, by_axis, order, boxes, size=1)
+        run_slices(_split_level, 1 << level, level, *here, *there, size=1)
+        here, there = there, here
+    run_slices(_split_subtrees, 1 << shared, shared, depth, *here, *there, boxes, blocks, size=1)
+    here, there = (there, here) if (depth - shared) % 2 == 0 else (here, there)
+    boxes[0] = 0.0
     _inner_boxes(1 << depth, boxes)
-    return NeighborIndex(order, by_axis, boxes)
+    return NeighborIndex(here[1], here[0], boxes, blocks)
+
+
+def _axes(count: int) -> np.ndarray:
+    """Room for (3, N) coordinates, and some behind them: the last eight points may be read as if they were whole."""
+    return np.zeros(3 * count + LANES)[: 3 * count].reshape(3, count)
 
 
 def bounds(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -102,88 +116,106 @@ def _load(start, stop, xyz, by_axis, order):
 
 @kernel
 def node_start(place, count, nodes):
-    """First sorted point of a node: its place in its level, and how many nodes the level has."""
-    return place * count // nodes
+    """First sorted point of a node: its place in its level, and how many nodes the level has.
+
+    Nodes begin at multiples of eight, so that eight points in step share a leaf.
+    """
+    return min(place * ((count + LANES - 1) // LANES) // nodes * LANES, count)
+
+
+def leaf_starts(index: NeighborIndex) -> np.ndarray:
+    """Return the first sorted point of each leaf, and the number of points after the last, (L + 1,) int64."""
+    leaves = len(index.boxes) // 2
+    blocks = (len(index) + LANES - 1) // LANES
+    return np.minimum(np.arange(leaves + 1) * blocks // leaves * LANES, len(index))
 
 
 @kernel
-def _select(key, second, third, order, low, high, middle):
-    """Reorder places low..high of four arrays so that the keys before `middle` are the smallest (Floyd & Rivest 1975).
-
-    Their sampling step makes it 5 times as fast here as quickselect with a median of three.
-    """
-    while high > low:
-        if high - low > 600:
-            count, rank = high - low + 1, middle - low + 1
-            z = math.log(count)
-            sample = 0.5 * math.exp(2.0 * z / 3.0)
-            spread = 0.5 * math.sqrt(z * sample * (count - sample) / count) * (1.0 if 2 * rank > count else -1.0)
-            sample_low = max(low, int(middle - rank * sample / count + spread))
-            sample_high = min(high, int(middle + (count - rank) * sample / count + spread))
-            _select(key, second, third, order, sample_low, sample_high, middle)
-        pivot, i, j = key[middle], low, high
-        while i <= j:
-            while key[i] < pivot:
-                i += 1
-            while key[j] > pivot:
-                j -= 1
-            if i <= j:
-                key[i], key[j] = key[j], key[i]
-                second[i], second[j] = second[j], second[i]
-                third[i], third[j] = third[j], third[i]
-                order[i], order[j] = order[j], order[i]
-                i += 1
-                j -= 1
-        if middle <= j:
-            high = j
-        elif middle >= i:
-            low = i
-        else:
-            return
+def _extent(values, first, last):
+    """Smallest and largest of values[first:last]."""
+    low, high = spread(np.inf), spread(-np.inf)
+    whole = first + (last - first) // LANES * LANES
+    for p in range(first, whole, LANES):
+        v = load(values, p)
+        low, high = smaller(low, v), larger(high, v)
+    least, most = smallest_of(low), largest_of(high)
+    for p in range(whole, last):
+        least, most = min(least, values[p]), max(most, values[p])
+    return least, most
 
 
 @kernel
 def _box(xyz, first, last, box):
-    """Lower and upper corner of the sorted points first..last-1."""
+    """Lower and upper corner of the sorted points first..last-1; returns the widest axis."""
+    widest = 0
     for axis in range(3):
-        coordinate = xyz[axis]
-        low, high = np.inf, -np.inf
-        for p in range(first, last):
-            low, high = min(low, coordinate[p]), max(high, coordinate[p])
-        box[axis], box[3 + axis] = low, high
+        box[axis], box[3 + axis] = _extent(xyz[axis], first, last)
+        if box[3 + axis] - box[axis] > box[3 + widest] - box[widest]:
+            widest = axis
+    return widest
 
 
 @kernel
-def _split_node(place, level, xyz, order, box):
-    """Halve a node at the median of its widest axis."""
+def _split_node(place, level, xyz, order, to_xyz, to_order, room, box):
+    """Halve a node at the median of its widest axis, from one pair of arrays into the other."""
     count, nodes = xyz.shape[1], 1 << level
     first, last = node_start(place, count, nodes), node_start(place + 1, count, nodes)
-    _box(xyz, first, last, box)
-    axis = 0
-    for a in range(1, 3):
-        if box[3 + a] - box[a] > box[3 + axis] - box[axis]:
-            axis = a
     middle = node_start(2 * place + 1, count, 2 * nodes)
-    _select(xyz[axis], xyz[(axis + 1) % 3], xyz[(axis + 2) % 3], order, first, last - 1, middle)
+    axis = _box(xyz, first, last, box)
+    key, second, third = xyz[axis], xyz[(axis + 1) % 3], xyz[(axis + 2) % 3]
+    to_key, to_second, to_third = to_xyz[axis], to_xyz[(axis + 1) % 3], to_xyz[(axis + 2) % 3]
+    pivot = value_at(middle - first, key, first, last - first, room)
+    left, right = first, last - 1
+    for p in range(first, last):
+        below = key[p] < pivot
+        to = left if below else right
+        to_key[to], to_second[to], to_third[to], to_order[to] = key[p], second[p], third[p], order[p]
+        left += below
+        right -= not below
+    if left < middle and box[axis] < box[3 + axis]:  # some that equal the median belong to the left
+        tied = left
+        for p in range(left, last):
+            if to_key[p] == pivot:
+                to_key[p], to_key[tied] = to_key[tied], to_key[p]
+                to_second[p], to_second[tied] = to_second[tied], to_second[p]
+                to_third[p], to_third[tied] = to_third[tied], to_third[p]
+                to_order[p], to_order[tied] = to_order[tied], to_order[p]
+                tied += 1
+        sort_places(to_key, to_second, to_third, to_order, left, tied)
 
 
 @kernel
-def _split_level(start, stop, level, xyz, order):
+def _room(place, count, nodes):
+    """Room for the keys of a node, and some more to fill up eights."""
+    return np.empty(node_start(place + 1, count, nodes) - node_start(place, count, nodes) + LANES + BUCKET)
+
+
+@kernel
+def _split_level(start, stop, level, xyz, order, to_xyz, to_order):
     box = np.empty(6)
     for place in range(start, stop):
-        _split_node(place, level, xyz, order, box)
+        room = _room(place, xyz.shape[1], 1 << level)
+        _split_node(place, level, xyz, order, to_xyz, to_order, room, box)
 
 
 @kernel
-def _split_subtrees(start, stop, top, depth, xyz, order, boxes):
-    box = np.empty(6)
-    for level in range(top, depth):
-        for place in range(start << (level - top), stop << (level - top)):
-            _split_node(place, level, xyz, order, box)
-    leaves = 1 << depth
-    for leaf in range(start << (depth - top), stop << (depth - top)):
-        first, last = node_start(leaf, xyz.shape[1], leaves), node_start(leaf + 1, xyz.shape[1], leaves)
-        _box(xyz, first, last, boxes[leaves + leaf])
+def _split_subtrees(start, stop, top, depth, xyz, order, other_xyz, other_order, boxes, blocks):
+    for subtree in range(start, stop):
+        room, box = _room(subtree, xyz.shape[1], 1 << top), np.empty(6)
+        here, rows, there, other_rows = xyz, order, other_xyz, other_order
+        for level in range(top, depth):
+            for place in range(subtree << (level - top), (subtree + 1) << (level - top)):
+                _split_node(place, level, here, rows, there, other_rows, room, box)
+            here, rows, there, other_rows = there, other_rows, here, rows
+        leaves = 1 << depth
+        for leaf in range(subtree << (depth - top), (subtree + 1) << (depth - top)):
+            first, last = node_start(leaf, xyz.shape[1], leaves), node_start(leaf + 1, xyz.shape[1], leaves)
+            axis = _box(here, first, last, boxes[leaves + leaf])
+            sort_leaf(axis, here, rows, there, other_rows, first, last, room)
+            for p in range(first, last, LANES):
+                for axis in range(3):
+                    low, high = _extent(there[axis], p, min(p + LANES, last))
+                    blocks[axis, p // LANES], blocks[3 + axis, p // LANES] = low, high
 
 
 @kernel

@@ -1,7 +1,7 @@
 """Exact nearest neighbours.
 
-Queries are answered in chunks of points that lie together, which share the walk through the tree. Ties of distance go
-to the smaller coordinates (x, then y, then z), so neighbours do not depend on the order of the input.
+Ties of distance go to the smaller coordinates (x, then y, then z), so neighbours do not depend on the order of the
+input.
 """
 
 from __future__ import annotations
@@ -12,8 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from edgel.kdtree import BUCKET, NeighborIndex, build_index, node_start
-from edgel.parallel import kernel, run_slices
+from edgel.blocks import CHUNK, aligned, larger_room, look_round, make_room, queries_of, tree_of
+from edgel.kdtree import NeighborIndex, build_index
+from edgel.lanes import LANES, as_floats, bits, counted, counts_of, load, store
+from edgel.parallel import kernel, part, run_slices
+from edgel.search import first_of, nearest_of_eight
+
+_SLICE = 4096  # queries whose neighbours exist at a time, for each thread
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,118 +78,77 @@ def visit_neighbors(
     num_neighbors : int
         k.
     """
-    leaves = len(queries.boxes) // 2
+    asked, tree = queries_of(queries), tree_of(index)
 
     def work(start: int, stop: int) -> None:
-        first, last = node_start(start, len(queries), leaves), node_start(stop, len(queries), leaves)
-        places = np.empty((last - first, num_neighbors), np.int64)
-        squared = np.empty((last - first, num_neighbors))
-        _knn(start, stop, leaves, queries.xyz, index.xyz, index.order, index.boxes, places, squared)
-        visit(first, places, squared, queries.xyz, queries.order, index.xyz, *arguments)
+        places = np.empty((stop - start, num_neighbors), np.int64)
+        squared = np.empty((stop - start, num_neighbors))
+        _list(start, stop, asked, tree, places, squared)
+        visit(start, places, squared, queries.xyz, queries.order, index.xyz, *arguments)
 
-    run_slices(work, leaves, size=256)
-
-
-@kernel
-def _box_distance(boxes, node, low_x, low_y, low_z, high_x, high_y, high_z):
-    """Squared distance between a node's box and another box."""
-    dx = max(boxes[node, 0] - high_x, low_x - boxes[node, 3], 0.0)
-    dy = max(boxes[node, 1] - high_y, low_y - boxes[node, 4], 0.0)
-    dz = max(boxes[node, 2] - high_z, low_z - boxes[node, 5], 0.0)
-    return dx * dx + dy * dy + dz * dz
+    run_slices(work, len(queries), size=_SLICE)
 
 
 @kernel
-def _first_of(xyz, order, a, b):
-    """Whether sorted point a comes before b by x, y, z; duplicates by their row in the input."""
-    for axis in range(3):
-        if xyz[axis, a] != xyz[axis, b]:
-            return xyz[axis, a] < xyz[axis, b]
-    return order[a] < order[b]
+def _list(start, stop, queries, tree, places, squared):
+    """List the k nearest of the queries start..stop-1, nearest first."""
+    room, reach, k = make_room(), np.inf, places.shape[1]
+    length = (k + LANES - 1) // LANES * LANES
+    distances, ranks, points = aligned(length + 1), aligned(length), np.empty(length + 1, np.int64)
+    for first in range(start, stop, CHUNK):
+        last = min(first + CHUNK, stop)
+        near, near_reach = look_round(tree, queries, first, last, reach, room)
+        begin = first
+        while begin < last:
+            size, count, reach = nearest_of_eight(tree, queries, first, last, begin, near, near_reach, reach, k, room)
+            if size == 0:
+                room = larger_room(room)
+            for lane in range(size):
+                _take(room, count, lane, points, distances)
+                q = begin + lane - start
+                _rank(tree, points, distances, ranks, places[q], squared[q])
+            begin += size
 
 
-@kernel
-def _scan_leaf(xyz, order, first, count, x, y, z, best, places, distances):
-    """Offer the points of a leaf to a query's list of the k best, which stays sorted."""
-    px, py, pz = xyz[0], xyz[1], xyz[2]
+@part
+def _take(room, count, lane, points, distances):
+    """Copy the places and squared distances of a lane's k nearest, in the order of the tree."""
+    limit, kept = room.limits[lane], 0
     for i in range(count):
-        dx, dy, dz = px[first + i] - x, py[first + i] - y, pz[first + i] - z
-        distances[i] = dx * dx + dy * dy + dz * dz
-    k = len(best)
-    worst = best[k - 1]
-    for i in range(count):
-        d = distances[i]
-        if d <= worst:
-            place, slot = first + i, k
+        first = LANES * room.found[i]
+        for j in range(LANES):
+            d = room.squared[(i * LANES + j) * LANES + lane]
+            points[kept], distances[kept] = first + j, d  # written in any case: no branch to guess
+            kept += d <= limit
+
+
+@part
+def _rank(tree, points, distances, ranks, places, squared):
+    """Sort a list of neighbours by distance, ties by coordinates: the rank of each is how many are nearer."""
+    k = len(places)
+    for i in range(k, len(ranks)):
+        distances[i] = np.inf
+    tied = False
+    for i in range(0, k, LANES):
+        d, nearer, equal = load(distances, i), counts_of(0), counts_of(0)
+        for j in range(k):
+            nearer = counted(nearer, d > distances[j])
+            equal = counted(equal, d == distances[j])
+        store(ranks, i, as_floats(nearer))
+        tied |= bits((equal > 1) & (d < np.inf)) != 0
+    if tied:
+        for i in range(k):
+            slot, d, point = i, distances[i], points[i]
             while slot > 0 and (
-                d < best[slot - 1]
-                or (d == best[slot - 1] and (places[slot - 1] < 0 or _first_of(xyz, order, place, places[slot - 1])))
+                d < squared[slot - 1] or (d == squared[slot - 1] and first_of(tree, point, places[slot - 1]))
             ):
+                squared[slot], places[slot] = squared[slot - 1], places[slot - 1]
                 slot -= 1
-                if slot < k - 1:
-                    best[slot + 1], places[slot + 1] = best[slot], places[slot]
-            if slot < k:
-                best[slot], places[slot] = d, place
-                worst = best[k - 1]
-    return worst
-
-
-@kernel
-def _knn_chunk(queries, first, count, xyz, order, boxes, best, places, stack, reaches, distances):
-    """Find the k nearest of `count` queries from `first` on, which lie together, in one walk through the tree.
-
-    `stack` (64,), `reaches` (64,) and `distances` (BUCKET,) are room to work in.
-    """
-    low_x, low_y, low_z = np.inf, np.inf, np.inf
-    high_x, high_y, high_z = -np.inf, -np.inf, -np.inf
-    for q in range(first, first + count):
-        low_x, high_x = min(low_x, queries[0, q]), max(high_x, queries[0, q])
-        low_y, high_y = min(low_y, queries[1, q]), max(high_y, queries[1, q])
-        low_z, high_z = min(low_z, queries[2, q]), max(high_z, queries[2, q])
-    k, num_points, leaves = best.shape[1], xyz.shape[1], boxes.shape[0] // 2
-    reach, depth = np.inf, 1
-    stack[0], reaches[0] = 1, 0.0
-    while depth > 0:
-        depth -= 1
-        node = stack[depth]
-        if reaches[depth] > reach:
-            continue
-        if node < leaves:
-            near, far = 2 * node, 2 * node + 1
-            near_d = _box_distance(boxes, near, low_x, low_y, low_z, high_x, high_y, high_z)
-            far_d = _box_distance(boxes, far, low_x, low_y, low_z, high_x, high_y, high_z)
-            if far_d < near_d:
-                near, far, near_d, far_d = far, near, far_d, near_d
-            # The nearer child lies on top: its points shorten the reach before the other is looked at.
-            stack[depth], reaches[depth] = far, far_d
-            stack[depth + 1], reaches[depth + 1] = near, near_d
-            depth += 2
-            continue
-        start = node_start(node - leaves, num_points, leaves)
-        size = node_start(node - leaves + 1, num_points, leaves) - start
-        reach = 0.0
-        for q in range(count):
-            x, y, z = queries[0, first + q], queries[1, first + q], queries[2, first + q]
-            worst = best[q, k - 1]
-            if _box_distance(boxes, node, x, y, z, x, y, z) <= worst:
-                worst = _scan_leaf(xyz, order, start, size, x, y, z, best[q], places[q], distances)
-            reach = max(reach, worst)
-
-
-@kernel
-def _knn(start, stop, leaves, queries, xyz, order, boxes, places, squared):
-    """Find the k nearest of the queries in leaves start..stop-1 of their own tree."""
-    places[:] = -1
-    squared[:] = np.inf
-    stack, reaches, distances = np.empty(64, np.int64), np.empty(64), np.empty(BUCKET)
-    base = node_start(start, queries.shape[1], leaves)
-    for leaf in range(start, stop):
-        first = node_start(leaf, queries.shape[1], leaves)
-        last = node_start(leaf + 1, queries.shape[1], leaves)
-        own = slice(first - base, last - base)
-        _knn_chunk(
-            queries, first, last - first, xyz, order, boxes, squared[own], places[own], stack, reaches, distances
-        )
+            squared[slot], places[slot] = d, point
+        return
+    for i in range(k):
+        slot = int(ranks[i])
+        squared[slot], places[slot] = distances[i], points[i]
 
 
 @kernel

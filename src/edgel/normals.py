@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 
+from edgel.blocks import Queries, Tree, queries_of, tree_of
 from edgel.cloud import as_cloud, as_vector, check_points, check_rows
 from edgel.kdtree import NeighborIndex, build_index
-from edgel.neighbors import visit_neighbors
-from edgel.parallel import kernel
+from edgel.parallel import kernel, run_slices
+from edgel.planes import fit_slice
 
-# Below this share of the largest variance the middle one is rounding: the neighbours lie on a line, or on one spot.
-_FLAT = 1e-12
+_SLICE = 8192  # queries: the first chunk of a slice has none before it to guess its reach from
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,10 +50,20 @@ class Normals:
         """Return the planes of some rows."""
         return Normals(self.normals[rows], self.offset[rows], self.residual[rows], self.variation[rows])
 
+    def put(self, rows: np.ndarray, planes: Normals) -> None:
+        """Overwrite the planes of some rows."""
+        for each in fields(self):
+            getattr(self, each.name)[rows] = getattr(planes, each.name)
+
     def flipped(self, where: np.ndarray) -> Normals:
         """Return the same planes with the normals of a (M,) mask turned round."""
         sign = np.where(where, -1.0, 1.0)
         return replace(self, normals=self.normals * sign[:, None], offset=self.offset * sign)
+
+
+def no_planes(count: int) -> Normals:
+    """Return that many planes, all still undefined."""
+    return Normals(np.full((count, 3), np.nan), *(np.full(count, np.nan) for _ in range(3)))
 
 
 def estimate_normals(points: Any, *, at: Any = None, num_neighbors: int = 16, viewpoint: Any = None) -> Normals:
@@ -115,29 +125,54 @@ def check_num_neighbors(num_neighbors: int, num_points: int) -> int:
 
 
 def plane_fits(index: NeighborIndex, xyz: np.ndarray, num_neighbors: int) -> Normals:
-    """Fit planes to the k nearest neighbours of (M, 3) finite positions; the normals' signs are arbitrary."""
+    """Fit planes to the k nearest neighbours of (M, 3) finite positions; the normals look upwards (+Z)."""
     k = check_num_neighbors(num_neighbors, len(index))
     if len(xyz) == 0:
-        return Normals(np.empty((0, 3)), np.empty(0), np.empty(0), np.empty(0))
+        return no_planes(0)
     return fit_planes(index, build_index(xyz), k)
 
 
 def fit_planes(index: NeighborIndex, queries: NeighborIndex, num_neighbors: int) -> Normals:
-    """Fit planes at sorted queries, which may be the index itself; results in the queries' own order."""
-    planes = np.empty((len(queries), 6))
-    visit_neighbors(_fit_planes, queries, index, num_neighbors, planes)
-    normals = np.ascontiguousarray(planes[:, :3])
-    return Normals(normals, planes[:, 3].copy(), planes[:, 4].copy(), planes[:, 5].copy())
+    """Fit planes at sorted queries, which may be the index itself; normals upwards, rows in the queries' own order."""
+    return _fit(tree_of(index), queries_of(queries), num_neighbors, np.empty(0))
+
+
+def plane_fits_within(
+    index: NeighborIndex, places: np.ndarray, rows: np.ndarray, num_neighbors: int
+) -> tuple[Normals, np.ndarray]:
+    """Fit planes at some of an index' own points.
+
+    Parameters
+    ----------
+    places : (M,) int64
+        Places of the points in the index, ascending.
+    rows : (M,) int64
+        Where the results of each go: a permutation.
+
+    Returns
+    -------
+    Normals
+    (M,) float64
+        Distance within which the neighbours of each lie.
+    """
+    limits = np.empty(len(rows))
+    x, y, z = index.xyz.take(places, axis=1)
+    planes = _fit(tree_of(index), Queries(x, y, z, rows), num_neighbors, limits)
+    return planes, np.sqrt(limits)
+
+
+def _fit(tree: Tree, queries: Queries, num_neighbors: int, limits: np.ndarray) -> Normals:
+    count = len(queries.rows)
+    planes = Normals(np.empty((count, 3)), np.empty(count), np.empty(count), np.empty(count))
+    results = (planes.normals, planes.offset, planes.residual, planes.variation)
+    run_slices(fit_slice, count, queries, tree, num_neighbors, *results, limits, size=_SLICE)
+    return planes
 
 
 def towards(planes: Normals, xyz: np.ndarray, viewpoint: np.ndarray | None) -> Normals:
-    """Turn the normals at (M, 3) positions towards a viewpoint (3,), or upwards (+Z) when it is None."""
+    """Turn the upward normals of `fit_planes` at (M, 3) positions towards a viewpoint (3,), unless it is None."""
     if viewpoint is None:
-        n = planes.normals
-        # A vertical face is seen from no side from above: then +Y, then +X decides, so that the sign is not left to
-        # rounding in the eigenvector.
-        down = (n[:, 2] < 0) | ((n[:, 2] == 0) & ((n[:, 1] < 0) | ((n[:, 1] == 0) & (n[:, 0] < 0))))
-        return planes.flipped(down)
+        return planes
     return planes.flipped(((viewpoint - xyz) * planes.normals).sum(axis=1) < 0)
 
 
@@ -150,12 +185,9 @@ def _spread(planes: Normals, wanted: np.ndarray) -> Normals:
     """Put planes into the rows of a mask, NaN elsewhere."""
     if wanted.all():
         return planes
-    full = {}
-    for name in ("normals", "offset", "residual", "variation"):
-        values = getattr(planes, name)
-        full[name] = np.full((len(wanted), *values.shape[1:]), np.nan)
-        full[name][wanted] = values
-    return Normals(**full)
+    full = no_planes(len(wanted))
+    full.put(np.flatnonzero(wanted), planes)
+    return full
 
 
 @kernel
@@ -216,34 +248,3 @@ def _orthogonal_to_largest(a, xy, xz, b, yz, c):
     if length == 0.0:
         return 0.0, 0.0, 1.0
     return x / length, y / length, z / length
-
-
-@kernel
-def _fit_planes(first, places, squared, queries, query_order, xyz, planes):
-    k = places.shape[1]
-    for q in range(places.shape[0]):
-        # Sums are taken about the query, so that they keep their digits far from the origin.
-        x, y, z = queries[0, first + q], queries[1, first + q], queries[2, first + q]
-        mx, my, mz = 0.0, 0.0, 0.0
-        for i in range(k):
-            mx += xyz[0, places[q, i]] - x
-            my += xyz[1, places[q, i]] - y
-            mz += xyz[2, places[q, i]] - z
-        mx, my, mz = mx / k, my / k, mz / k
-        xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for i in range(k):
-            dx = xyz[0, places[q, i]] - x - mx
-            dy = xyz[1, places[q, i]] - y - my
-            dz = xyz[2, places[q, i]] - z - mz
-            xx, xy, xz = xx + dx * dx, xy + dx * dy, xz + dx * dz
-            yy, yz, zz = yy + dy * dy, yz + dy * dz, zz + dz * dz
-        smallest, middle, nx, ny, nz = smallest_eigenpair(xx, xy, xz, yy, yz, zz)
-        trace = xx + yy + zz
-        plane = planes[query_order[first + q]]
-        if middle <= _FLAT * trace:
-            plane[:] = np.nan
-            continue
-        plane[0], plane[1], plane[2] = nx, ny, nz
-        plane[3] = nx * (x + mx) + ny * (y + my) + nz * (z + mz)
-        plane[4] = max(smallest, 0.0)
-        plane[5] = max(smallest, 0.0) / trace

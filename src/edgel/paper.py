@@ -17,14 +17,18 @@ from edgel.canny import CannyResult, canny
 from edgel.cloud import check_points
 from edgel.edges import EdgeKind, Edges, one_face
 from edgel.kdtree import bounds, build_index
-from edgel.normals import Normals, by_offset, check_num_neighbors, plane_fits
-from edgel.project import PixelGrid, back_project, grey_image, occupied_spacing, project
+from edgel.normals import Normals, by_offset, check_num_neighbors, no_planes, plane_fits_within
+from edgel.project import PixelGrid, back_project, grey_image, occupied_spacing, points_near, project
 from edgel.stages import Stages
 
 PIXEL_SPACINGS = 4.0  # default pixel, in point spacings: coarse enough for no holes, which would all be edges
 TOLERANCE_SHARE = 0.018  # default tolerance, of the image's size: both of the paper's parts give about 10 %
 _STEP_RESPONSE = 4.0 * 255.0  # the Sobel magnitude of the largest step of grey, which is strength 1
 _MAX_PIXELS = 2**28
+# Pixels, in which neighbours are looked for first: just below three, so that three more on every side are enough. On a
+# level surface the 16 nearest reach 0.56 of the default pixel, on the steep sides of the paper's tee up to 3.7; with
+# 0.99 two fifths of its edge points had to be tried again, with 2.99 one in 3,000.
+_FIRST_REACH = 2.99
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -127,10 +131,8 @@ def detect(
     with stages("back-projection"):
         window = choose_tolerance(tolerance, grid)
         hits = back_project(checked.xyz, grid, found.edges, found.magnitude, window)
-    with stages("index"):
-        index = build_index(checked.xyz)
     with stages("normals"):
-        planes = by_offset(plane_fits(index, checked.xyz[hits.rows], num_neighbors))
+        planes = by_offset(local_plane_fits(checked.xyz, grid, hits.rows, num_neighbors))
     return PaperEdges(
         index=checked.rows[hits.rows],
         kind=np.full(len(hits.rows), EdgeKind.IMAGE, np.uint8),
@@ -159,6 +161,31 @@ def detect(
         image=image,
         edge_map=found.edges,
     )
+
+
+def local_plane_fits(xyz: np.ndarray, grid: PixelGrid, rows: np.ndarray, num_neighbors: int) -> Normals:
+    """Fit planes to the k nearest of all points (N, 3), at some rows (M,), without sorting all of them.
+
+    Two points are at least as far apart in space as in the projection, so only points in pixels nearby can be among
+    the neighbours. A point whose neighbours reach as far as the pixels looked at is tried again with more of them.
+    """
+    k = check_num_neighbors(num_neighbors, len(xyz))
+    planes = no_planes(len(rows))
+    left, reach = np.arange(len(rows)), _FIRST_REACH * max(grid.pixel)
+    while len(left):
+        near = points_near(xyz, grid, rows[left], reach)
+        if len(near) >= k:
+            asked = np.zeros(len(xyz), np.bool_)
+            asked[rows[left]] = True
+            asked = asked[near]
+            index = build_index(xyz[near])
+            places = np.flatnonzero(asked[index.order])
+            found, distances = plane_fits_within(index, places, (np.cumsum(asked) - 1)[index.order[places]], k)
+            sure = (distances < reach) | (len(near) == len(xyz))
+            planes.put(left[sure], found.take(sure))
+            left = left[~sure]
+        reach *= 4.0
+    return planes
 
 
 def choose_grid(xyz: np.ndarray, width: int | None, height: int | None) -> PixelGrid:

@@ -31,6 +31,12 @@ def summing_kernel(function: F) -> F:
     return njit(nogil=True, cache=True, fastmath={"reassoc", "nsz", "contract"})(function)  # pyright: ignore[reportReturnType]
 
 
+def part(function: F) -> F:
+    """Compile a part of kernels, which is inlined (an array passed costs seven words); Python cannot call it."""
+    options: dict[str, Any] = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    return njit(nogil=True, cache=True, **options)(function)  # pyright: ignore
+
+
 def num_threads() -> int:
     """Return how many threads kernels use: ``EDGEL_NUM_THREADS``, or the cores this process may run on."""
     asked = os.environ.get("EDGEL_NUM_THREADS", "")
@@ -65,18 +71,24 @@ def run_slices(compiled: Callable[..., Any], count: int, *arguments: Any, size: 
     starts = range(0, count, size)
     if not starts:
         return
-    # The first slice runs alone: it compiles the kernel, which two threads would otherwise do twice.
-    compiled(0, min(size, count), *arguments)
-    threads = num_threads()
-    if threads == 1 or len(starts) < 3:
-        for start in starts[1:]:
+    threads = min(num_threads(), len(starts))
+    if threads == 1:
+        for start in starts:
             compiled(start, min(start + size, count), *arguments)
         return
-    jobs = [_pool(threads).submit(compiled, start, min(start + size, count), *arguments) for start in starts[1:]]
+    # Each thread takes the next slice when it is done with one: a job a slice would cost 20 us each. Two threads that
+    # meet a kernel for the first time do not compile it twice: Numba holds a lock and looks again.
+    left = iter(starts)
+
+    def work() -> None:
+        for start in left:
+            compiled(start, min(start + size, count), *arguments)
+
+    jobs = [_pool(threads).submit(work) for _ in range(threads)]
     try:
         for job in jobs:
             job.result()
     except BaseException:  # Ctrl-C too: what has not begun need not run any more
-        for job in jobs:
-            job.cancel()
+        for _ in left:
+            pass
         raise

@@ -148,11 +148,49 @@ def back_project(
     """
     counts = _summed(edges.astype(np.int64))
     totals = _summed(np.where(edges, magnitude, 0.0))
+    # Most pixels lie so far from all edges that no point in them can be near one: two more pixels than the tolerance,
+    # one since a point lies right of its pixel's corner, one for rounding.
+    frame = slice(grid.frame, -grid.frame or None)
+    close = _grown(edges, *(int(min(tolerance / side, 1e6)) + 2 for side in grid.pixel))[frame, frame]
     strength = np.empty(len(xyz))
     at = (grid.lower, grid.upper, grid.frame)
-    run_slices(_window_means, len(xyz), xyz, *at, counts, totals, tolerance, strength, size=65536)
+    run_slices(_window_means, len(xyz), xyz, *at, close, counts, totals, tolerance, strength, size=65536)
     rows = np.flatnonzero(strength >= 0)
     return BackProjection(rows, strength[rows])
+
+
+def points_near(xyz: np.ndarray, grid: PixelGrid, rows: np.ndarray, distance: float) -> np.ndarray:
+    """Find all points that may lie within a distance of some of them in the projection, and so in space.
+
+    Parameters
+    ----------
+    xyz : (N, 3) float64
+    grid : PixelGrid
+    rows : (M,) int64
+    distance : float
+        In the cloud's unit. Points farther away may be found too, as far as the next pixel.
+
+    Returns
+    -------
+    (K,) int64
+        Rows, ascending.
+    """
+    pixels = np.zeros(grid.height * grid.width, np.bool_)
+    pixels[pixel_coordinates(xyz[rows], grid)] = True
+    across, along = (int(min(distance / side * (1 + 1e-9), 1e6)) + 1 for side in grid.pixel)
+    close = _grown(pixels.reshape(grid.height, grid.width), across, along)
+    found = np.empty(len(xyz), np.bool_)
+    run_slices(_in_pixels, len(xyz), xyz, grid.lower, grid.upper, close, found, size=65536)
+    return np.flatnonzero(found)
+
+
+def _grown(pixels: np.ndarray, across: int, along: int) -> np.ndarray:
+    """Set all pixels of an (H, W) mask within so many columns and rows of one that is set."""
+    height, width = pixels.shape
+    across, along = min(across, width), min(along, height)
+    counts = _summed(np.pad(pixels, ((along, along), (across, across))).astype(np.int64))
+    tall, wide = 2 * along + 1, 2 * across + 1
+    return counts[tall:, wide:] - counts[:-tall, wide:] > counts[tall:, :-wide] - counts[:-tall, :-wide]
 
 
 def _summed(values: np.ndarray) -> np.ndarray:
@@ -167,6 +205,15 @@ def _pixels(start, stop, xyz, lower, upper, width, height, pixels):
         col = min(int(width * (xyz[p, 0] - lower[0]) / extent_x), width - 1)
         row = min(int(height * (xyz[p, 1] - lower[1]) / extent_y), height - 1)
         pixels[p] = row * width + col
+
+
+@kernel
+def _in_pixels(start, stop, xyz, lower, upper, pixels, found):
+    height, width = pixels.shape
+    for p in range(start, stop):
+        col = min(int(width * (xyz[p, 0] - lower[0]) / (upper[0] - lower[0])), width - 1)
+        row = min(int(height * (xyz[p, 1] - lower[1]) / (upper[1] - lower[1])), height - 1)
+        found[p] = pixels[row, col]
 
 
 @kernel
@@ -191,9 +238,20 @@ def _window(value, lower, extent, count, frame, tolerance):
 
 
 @kernel
-def _window_means(start, stop, xyz, lower, upper, frame, counts, totals, tolerance, means):
-    height, width = counts.shape[0] - 1 - 2 * frame, counts.shape[1] - 1 - 2 * frame
+def _near_pixel(value, lower, scale, count):
+    """Pixel of an axis in which a point lies, or next to which: one multiplication, which may round over a border."""
+    return min(max(int((value - lower) * scale), 0), count - 1)
+
+
+@kernel
+def _window_means(start, stop, xyz, lower, upper, frame, close, counts, totals, tolerance, means):
+    height, width = close.shape
+    scale_x, scale_y = width / (upper[0] - lower[0]), height / (upper[1] - lower[1])
     for p in range(start, stop):
+        col, row = _near_pixel(xyz[p, 0], lower[0], scale_x, width), _near_pixel(xyz[p, 1], lower[1], scale_y, height)
+        if not close[row, col]:
+            means[p] = -1.0
+            continue
         left, right = _window(xyz[p, 0], lower[0], upper[0] - lower[0], width, frame, tolerance)
         low, high = _window(xyz[p, 1], lower[1], upper[1] - lower[1], height, frame, tolerance)
         count = counts[high, right] - counts[low, right] - counts[high, left] + counts[low, left]

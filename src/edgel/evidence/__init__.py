@@ -17,7 +17,7 @@ import numpy as np
 from edgel.evidence import coarse, context, gather, scales, sectors, sheets, through
 from edgel.evidence.forest import Forest, evaluate, read_forests
 from edgel.evidence.scales import SCALES
-from edgel.kdtree import NeighborIndex, build_index
+from edgel.kdtree import NeighborIndex, build_index, leaf_starts
 from edgel.neighbors import visit_neighbors
 
 FITS = ((8, 0), (12, 0), (24, 0), (48, 1), (96, 2))
@@ -29,8 +29,8 @@ NUM_COSTLY = (
 )
 NUM_ALL = NUM_COSTLY + 2 * context.NUM_FEATURES
 WEIGHTS = "weights.npz"
-COARSE = 0.005  # least probability of an edge in a leaf, by a glance at it, for looking at its points at all
-SCREEN = 0.02  # least probability of an edge, from the cheap evidence, for a closer look
+COARSE = 0.01  # least probability of an edge in a leaf, by a glance at it, for looking at its points at all
+SCREEN = 0.04  # least probability of an edge, from the cheap evidence, for a closer look
 SECOND = 0.02  # and from the costly evidence, for a second one
 MAX_AWAY = 1.5  # spacings: a line farther from the point is not its edge
 MIN_TURN = math.radians(12.0)  # of two planes that make an edge
@@ -127,10 +127,11 @@ def survey(index: NeighborIndex, trees: Mapping[str, Forest] | None = None) -> S
     """
     trees = forests() if trees is None else trees
     cloud, has_surface = census(index)
-    leaves, planes = coarse.look(index)
+    leaves, planes, nearest = coarse.look(index)
     known = np.concatenate([leaves, np.broadcast_to(cloud, (len(leaves), NUM_CLOUD))], axis=1)
-    size = np.diff(np.arange(len(leaves) + 1) * len(index) // len(leaves))
-    rough = np.repeat(evaluate(trees["coarse"], known) >= COARSE, size)
+    size = np.diff(leaf_starts(index))
+    # Those around a rough leaf are looked at too: how the tree cuts the cloud, which turns with it, must not matter.
+    rough = np.repeat((evaluate(trees["coarse"], known) >= COARSE)[nearest].any(axis=1), size)
     normals = np.repeat(planes[:, None].astype(np.float32), len(SCALES), axis=1).repeat(size, axis=0)
     likely = np.zeros(len(index), np.float32)
     places = np.flatnonzero(rough)

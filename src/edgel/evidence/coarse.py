@@ -21,16 +21,28 @@ GROUPS = (1, 4, 8, 12)  # leaves of each group that a plane is fitted to: the le
 NUM_FEATURES = 4 * len(GROUPS) + 4
 
 
-def look(index: NeighborIndex) -> tuple[np.ndarray, np.ndarray]:
-    """Describe each leaf: features (L, NUM_FEATURES) float32, and normal and planarity of its plane (L, 4) float64."""
+def look(index: NeighborIndex) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Describe each leaf of an index.
+
+    Returns
+    -------
+    (L, NUM_FEATURES) float32
+        Features.
+    (L, 4) float64
+        Normal and planarity of its plane.
+    (L, 12) int32
+        The leaves nearest to it, itself first; fewer where there are not as many.
+    """
     leaves = len(index.boxes) // 2
     sums, planes = np.empty((leaves, 13)), np.empty((leaves, 7))
     run_slices(_sum, leaves, index.xyz, leaves, sums, planes, size=1024)
     features = np.zeros((leaves, NUM_FEATURES), np.float32)
     middles = build_index(np.ascontiguousarray(sums[:, 10:]))
     k = min(GROUPS[-1], leaves)
-    visit_neighbors(_describe, middles, middles, k, middles.order, sums, planes, np.array(GROUPS), features)
-    return features, np.column_stack([planes[:, :3], np.exp(-planes[:, 6] / PLANAR)])
+    nearest = np.empty((leaves, k), np.int32)
+    visit_neighbors(_describe, middles, middles, k, middles.order, sums, planes, np.array(GROUPS), features, nearest)
+    planes = np.column_stack([planes[:, :3], np.exp(-planes[:, 6] / PLANAR)])
+    return features, planes, nearest
 
 
 @kernel
@@ -54,12 +66,14 @@ def _sum(start, stop, xyz, leaves, sums, planes):
 
 
 @kernel
-def _describe(first, places, squared, queries, query_order, xyz, order, sums, planes, groups, features):
+def _describe(first, places, squared, queries, query_order, xyz, order, sums, planes, groups, features, nearest):
     """For each group the variation, how far the leaf's middle lies off its plane, and its size; then the normals."""
     whole, plane = np.empty(10), np.empty(6)
     for q in range(places.shape[0]):
         leaf = query_order[first + q]
         own, out, done = planes[leaf], features[leaf], 0
+        for i in range(places.shape[1]):
+            nearest[leaf, i] = order[places[q, i]]
         whole[:] = 0.0
         size = math.sqrt(max(sums[leaf, 4] + sums[leaf, 7] + sums[leaf, 9], 0.0) / sums[leaf, 0])
         for g in range(len(groups)):

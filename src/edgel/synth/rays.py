@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel.kdtree import build_index
+from edgel.kdtree import build_index, node_start
 from edgel.parallel import kernel, run_slices
 from edgel.synth.solid import Solid
 
@@ -60,7 +60,7 @@ def build_ray_tree(solid: Solid) -> RayTree:
     index = build_index(np.ascontiguousarray(corners.mean(axis=1)))
     order, leaves = index.order, len(index.boxes) // 2
     ordered = corners[order]
-    starts = np.arange(leaves) * len(order) // leaves
+    starts = np.array([node_start(leaf, len(order), leaves) for leaf in range(leaves)])
     boxes = np.empty((2 * leaves, 6))
     boxes[leaves:, :3] = np.minimum.reduceat(ordered.min(axis=1), starts)
     boxes[leaves:, 3:] = np.maximum.reduceat(ordered.max(axis=1), starts)
@@ -150,7 +150,7 @@ def _cast(start, stop, rays, corners, boxes, distance, triangle, weights):
                 stack[top + 1], entries[top + 1] = near, near_at
                 top += 2
                 continue
-            for i in range((node - leaves) * count // leaves, (node - leaves + 1) * count // leaves):
+            for i in range(node_start(node - leaves, count, leaves), node_start(node - leaves + 1, count, leaves)):
                 at, u, v = _meets(corners[i], ray)
                 if at < best:
                     best, row, second, third = at, i, u, v
