@@ -197,8 +197,8 @@ def test_two_tabs_twenty_moves_and_a_tab_closed_meanwhile(page, browser, served,
     other = open_tab(browser, url, errors)
     for step in range(20):
         type_number(other, "Scale", 1.5 + 0.5 * (step % 10))
-    other.close()
     wait_for(lambda: session.settings.scale == 6.0, "the last move")
+    other.close()
     assert session.wait_idle(TIMEOUT)
     (pane,) = session.panes()
     assert pane.is_current

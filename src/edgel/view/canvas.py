@@ -17,13 +17,11 @@ from edgel.view.select import in_box
 from edgel.view.session import LEAST_STRENGTH, Pane
 from edgel.view.settings import Settings
 
-_POINT = 1.3  # size of a point of the cloud, in spacings: no holes, and little drawn twice
-_EDGE = 1.2  # size of an edge point, in those of the cloud
-_RISE = (
-    0.5  # sizes of a point by which edge points stand out on both sides of the surface, whose points would hide them
-)
-_LEAST_EDGE = 0.007  # scene units: two pixels or three on a usual screen
-_SPARSE = 0.006  # scene units: points that lie far from each other for the most part are seen at that size
+_POINT = 1.5  # side of a point of the cloud, a square, in spacings: no holes, and little drawn twice
+_EDGE = 1.0  # side of an edge point, in those of the cloud
+_RISE = 0.35  # sides of a point by which edge points stand out of the surface, whose points would hide them
+_LEAST_EDGE = 0.01  # scene units: three pixels on a usual screen
+_SPARSE = 0.01  # scene units: points that lie far from each other for the most part are seen at that size
 _NOTHING = np.zeros((1, 3), np.float32), np.zeros((1, 3), np.uint8)
 _NORMAL, _TANGENT = 0.06, 0.05  # lengths of segments, scene units
 _LIFT = 0.012  # scene units from the surface to the tangents, which the edge points would hide
@@ -98,7 +96,7 @@ class Canvas:
 
     def edge_size(self, pane: int) -> float:
         """Size of the edge points of a pane, in scene units."""
-        return float(self._nodes[f"/edges{pane}"].point_size)
+        return 2 * float(self._nodes[f"/edges{pane}"].point_size)
 
     def _draw_cloud(self, number: int, pane: Pane, place: Place, settings: Settings) -> None:
         source, name = pane.source, f"/cloud{number}"
@@ -140,8 +138,8 @@ class Canvas:
             node = self._nodes[name] = self._server.scene.add_point_cloud(
                 name, *_NOTHING, point_shape="square", precision="float32", point_shading="flat", visible=False
             )
-        if len(points):  # what did not change is not sent again
-            node.points, node.colors, node.point_size = points, colors, size
+        if len(points):  # what did not change is not sent again; viser draws points twice as large as it says
+            node.points, node.colors, node.point_size = points, colors, size / 2
         node.visible = len(points) > 0
 
     def _segments(self, name: str, segments: tuple[np.ndarray, np.ndarray] | None) -> None:
@@ -170,11 +168,11 @@ class Canvas:
 
 
 def _point_size(pane: Pane, place: Place) -> float:
-    """Size of the points of a cloud, in scene units: their spacing, more where most lie farther apart than that."""
+    """Side of the points of a cloud, in scene units: their spacing, more where most lie farther apart than that."""
     drawn = len(pane.source.shown)
     # Where only a part is drawn the gaps are wider.
     spacing = pane.source.spacing * place.unit * np.sqrt(len(pane.cloud) / drawn if pane.source.is_thinned else 1.0)
-    return float(max(_POINT * spacing, min(2.0 / np.sqrt(drawn), _SPARSE)))
+    return float(max(_POINT * spacing, min(3.0 / np.sqrt(drawn), _SPARSE)))
 
 
 def _outwards(edges: Edges, place: Place) -> np.ndarray:

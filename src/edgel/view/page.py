@@ -122,7 +122,7 @@ class Page:
         panes, shown = self._panes, self._canvas.shown
         sizes = [self._canvas.edge_size(number) for number in range(len(shown))]
         ray = np.array(event.ray_origin), np.array(event.ray_direction)
-        picked = pick(shown, *ray, max_angle=float(reach), radius=0.7 * max(sizes, default=0.0))
+        picked = pick(shown, *ray, max_angle=float(reach), radius=max(sizes, default=0.0))
         self._canvas.mark(picked)
         self._controls.numbers.content = texts.numbers(
             None if picked is None else describe(panes[picked.pane], picked.edge)

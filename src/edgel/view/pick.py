@@ -43,7 +43,7 @@ def pick(
     max_angle : float
         How far from the ray a point may lie, in radians.
     radius : float
-        How far it may lie anyway, in scene units: half its size.
+        How far it may lie anyway, in scene units: about its size.
 
     Returns
     -------

@@ -105,7 +105,9 @@ def _pane_status(pane: Pane, settings: Settings) -> str:
         lines.append(f"<div style='{_ALARM}'>No edges: {escape(answer.error)}</div>")
     elif pane.edges is not None:
         shown, found = len(pane.edges), len(answer.edges)
-        lines.append(f"<b>{shown:,} edge points</b> shown" + (f" of {found:,} found" if shown != found else ""))
+        lines.append(
+            f"<b>{shown:,} edge points</b> shown" + (f", {found - shown:,} fainter or hidden" if shown != found else "")
+        )
         scale = "" if pane.run is None or pane.run.scale == 1 else f" at scale {pane.run.scale:g}"
         lines.append(f"<span style='{_NOTE}'>found in {answer.seconds:.2f} s{scale}, {_how(answer.edges)}</span>")
     if not pane.is_current and answer is not None:
