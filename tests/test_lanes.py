@@ -79,10 +79,10 @@ def test_the_value_at_a_rank_is_that_of_the_sorted_keys(seed, count, values):
 @given(SEEDS, st.integers(0, 200))
 def test_places_are_sorted_by_all_three_coordinates(seed, count):
     xyz = np.random.default_rng(seed).integers(0, 4, (count, 3)).astype(float)
-    columns, order = [np.ascontiguousarray(column) for column in xyz.T], np.arange(count)
-    sort_places(*columns, order, 0, count)
+    x, y, z, order = *np.ascontiguousarray(xyz.T), np.arange(count)
+    sort_places(x, y, z, order, 0, count)
     expected = sorted(map(tuple, xyz.tolist()))
-    assert list(zip(*(column.tolist() for column in columns), strict=True)) == expected
+    assert list(zip(x.tolist(), y.tolist(), z.tolist(), strict=True)) == expected
     np.testing.assert_array_equal(xyz[order], np.reshape(expected, (-1, 3)))
 
 
@@ -150,8 +150,8 @@ def test_eigenpairs_are_those_of_lapack(seed, scale, least, middle):
     expected, vectors = np.linalg.eigh(m)
     size = expected[:, 2]
     gap = expected[:, 1] - expected[:, 0]
-    apart = gap > 1e-6 * size
-    assert (np.abs(smallest - expected[:, 0]) < np.where(apart, 1e-14, 1e-6) * size).all()
+    apart = gap > 1e-5 * size
+    assert (np.abs(smallest - expected[:, 0]) < np.where(apart, 1e-14, 1e-5) * size).all()
     assert (np.abs(second - expected[:, 1]) < 1e-6 * size).all()
     np.testing.assert_allclose(np.linalg.norm(vector, axis=1), 1, rtol=1e-12)
     turn = np.linalg.norm(np.cross(vector, vectors[:, :, 0]), axis=1)

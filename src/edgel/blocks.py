@@ -42,12 +42,14 @@ class Queries(NamedTuple):
 
 def tree_of(index: NeighborIndex) -> Tree:
     """Return the arrays of an index."""
-    return Tree(*index.xyz, index.order, index.boxes, index.blocks)
+    x, y, z = index.xyz
+    return Tree(x, y, z, index.order, index.boxes, index.blocks)
 
 
 def queries_of(index: NeighborIndex) -> Queries:
     """Return the sorted points of an index as queries."""
-    return Queries(*index.xyz, index.order)
+    x, y, z = index.xyz
+    return Queries(x, y, z, index.order)
 
 
 class Room(NamedTuple):

@@ -25,11 +25,12 @@ from typing import Any
 from llvmlite import ir
 from numba.core import types
 from numba.core.errors import TypingError
-from numba.core.typeconv import Conversion
+from numba.core.typeconv import Conversion  # pyright: ignore[reportPrivateImportUsage]
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
 
 LANES = 8
+_intrinsic: Any = intrinsic  # what it makes of a function has another signature
 
 
 class Floats(types.Type):
@@ -94,7 +95,7 @@ def _operator(function: Callable[..., Any], result: Any, operand: Any, build: Ca
     class Template(ConcreteTemplate):
         cases = [signature(result, operand, operand)]  # noqa: RUF012
 
-    @lower_builtin(function, operand, operand)
+    @lower_builtin(function, operand, operand)  # pyright: ignore[reportOptionalCall]
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return build(builder, *args)
 
@@ -137,7 +138,7 @@ def _check(array: Any) -> None:
         raise TypingError(f"lanes are read from and written to contiguous (N,) float64, not {array}")
 
 
-@intrinsic
+@_intrinsic
 def load(typing: Any, array: Any, i: Any) -> Any:
     """Read array[i : i + 8] of a contiguous (N,) float64."""
     _check(array)
@@ -148,7 +149,7 @@ def load(typing: Any, array: Any, i: Any) -> Any:
     return floats(array, types.intp), build
 
 
-@intrinsic
+@_intrinsic
 def store(typing: Any, array: Any, i: Any, values: Any) -> Any:
     """Write array[i : i + 8] of a contiguous (N,) float64."""
     _check(array)
@@ -182,7 +183,7 @@ def _function(result: Any, *operands: Any) -> Callable[[Callable[..., Any]], Any
 
         typed = (none, one, two, three)[len(operands)]
         typed.__name__, typed.__doc__ = build.__name__, build.__doc__
-        return intrinsic(typed)
+        return _intrinsic(typed)
 
     return decorate
 

@@ -156,7 +156,8 @@ def plane_fits_within(
         Distance within which the neighbours of each lie.
     """
     limits = np.empty(len(rows))
-    planes = _fit(tree_of(index), Queries(*index.xyz.take(places, axis=1), rows), num_neighbors, limits)
+    x, y, z = index.xyz.take(places, axis=1)
+    planes = _fit(tree_of(index), Queries(x, y, z, rows), num_neighbors, limits)
     return planes, np.sqrt(limits)
 
 

@@ -24,8 +24,8 @@ def kernel(function: F) -> F:
 
 def part(function: F) -> F:
     """Compile a part of kernels, which is inlined (an array passed costs seven words); Python cannot call it."""
-    compiled = njit(nogil=True, cache=True, forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
-    return compiled(function)  # pyright: ignore[reportReturnType]
+    options: dict[str, Any] = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    return njit(nogil=True, cache=True, **options)(function)  # pyright: ignore
 
 
 def num_threads() -> int:

@@ -132,7 +132,7 @@ def smallest_eigenpairs(xx, xy, xz, yy, yz, zz):
     length = root(x * x + y * y + z * z)
     none = length <= tiny
     x, y, z = where(none, zero, x / length), where(none, zero, y / length), where(none, spread(1.0), z / length)
-    for _ in range(3):
+    for _ in range(4):
         a, b, c = xx - smallest, yy - smallest, zz - smallest
         # Every column of the adjugate of A - lambda I points along the eigenvector; the longest is the safest.
         kxy, kxz, kyz = xz * yz - xy * c, xy * yz - xz * b, xy * xz - yz * a

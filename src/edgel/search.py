@@ -143,6 +143,7 @@ def _search(tree, room, near, near_reach, reach, k):
     qx, qy, qz = load(room.queries, 0), load(room.queries, LANES), load(room.queries, 2 * LANES)
     low_x, low_y, low_z = smallest_of(qx), smallest_of(qy), smallest_of(qz)
     high_x, high_y, high_z = largest_of(qx), largest_of(qy), largest_of(qz)
+    count, within = 0, counts_of(0)
     for attempt in range(3):
         if attempt == 2 or not reach < np.inf:
             reach = sure_reach(tree, low_x, low_y, low_z, high_x, high_y, high_z, k)
