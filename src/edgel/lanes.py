@@ -91,11 +91,11 @@ def _spread_int(context: Any, builder: Any, source: Any, target: Any, value: Any
 
 
 def _operator(function: Callable[..., Any], result: Any, operand: Any, build: Callable[..., Any]) -> None:
-    @infer_global(function)
+    @infer_global(function)  # pyright: ignore[reportOptionalCall]
     class Template(ConcreteTemplate):
         cases = [signature(result, operand, operand)]  # noqa: RUF012
 
-    @lower_builtin(function, operand, operand)  # pyright: ignore[reportOptionalCall]
+    @lower_builtin(function, operand, operand)
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return build(builder, *args)
 
