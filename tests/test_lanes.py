@@ -150,13 +150,11 @@ def test_eigenpairs_are_those_of_lapack(seed, scale, least, middle):
     expected, vectors = np.linalg.eigh(m)
     size = expected[:, 2]
     gap = expected[:, 1] - expected[:, 0]
-    # Two smallest eigenvalues within one percent of each other are not told apart in four steps, nor need to be.
-    apart = (gap > 0.01 * expected[:, 1]) & (expected[:, 1] > 3e-5 * size)
-    off = np.abs(smallest - expected[:, 0])
-    assert (off < np.where(apart, 1e-14 * size, 0.01 * expected[:, 1] + 1e-7 * size)).all()
-    assert (np.abs(second - expected[:, 1]) < np.where(apart, 1e-6 * size, 0.01 * expected[:, 1] + 1e-6 * size)).all()
+    apart = gap > 1e-5 * size
+    assert (np.abs(smallest - expected[:, 0]) < np.where(apart, 1e-14, 1e-5) * size).all()
+    assert (np.abs(second - expected[:, 1]) < 1e-6 * size).all()
     np.testing.assert_allclose(np.linalg.norm(vector, axis=1), 1, rtol=1e-12)
     turn = np.linalg.norm(np.cross(vector, vectors[:, :, 0]), axis=1)
-    assert (turn * gap < 1e-12 * size)[apart].all()  # LAPACK errs as well
+    assert (turn * gap < 1e-14 * size)[apart].all()
     across = np.abs((vector * vectors[:, :, 2]).sum(axis=1))
-    assert (across * (size - expected[:, 1]) < 1e-4 * size).all()
+    assert (across * (size - expected[:, 1]) < 1e-3 * size).all()  # on a line, any direction across it will do

@@ -25,7 +25,7 @@ from typing import Any
 from llvmlite import ir
 from numba.core import types
 from numba.core.errors import TypingError
-from numba.core.typeconv.castgraph import Conversion
+from numba.core.typeconv.castgraph import Conversion  # pyright: ignore[reportPrivateImportUsage]
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
 

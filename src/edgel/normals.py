@@ -227,17 +227,32 @@ def smallest_eigenpair(xx, xy, xz, yy, yz, zz):
         elif step > 0:  # the two smallest are equal: any direction across the largest will do
             break
         smallest = x * (xx * x + xy * y + xz * z) + y * (xy * x + yy * y + yz * z) + z * (xz * x + yz * y + zz * z)
-    return smallest * scale, (3.0 * mean - smallest - largest) * scale, x, y, z
+    middle = 3.0 * mean - smallest - largest
+    if middle < smallest:  # so near each other that the other one was found: turn to the direction across
+        u, v, w = _longest_row(xx - smallest, xy, xz, yy - smallest, yz, zz - smallest)
+        u, v, w = y * w - z * v, z * u - x * w, x * v - y * u
+        length = math.sqrt(u * u + v * v + w * w)
+        if length > 0.0:
+            x, y, z, middle = u / length, v / length, w / length, smallest
+            smallest = x * (xx * x + xy * y + xz * z) + y * (xy * x + yy * y + yz * z) + z * (xz * x + yz * y + zz * z)
+    return smallest * scale, middle * scale, x, y, z
 
 
 @kernel
-def _orthogonal_to_largest(a, xy, xz, b, yz, c):
-    """Return a unit vector across the longest row of a symmetric matrix (at rank 1, the largest eigenvector)."""
+def _longest_row(a, xy, xz, b, yz, c):
+    """Return the longest row of a symmetric matrix."""
     u, v, w = a, xy, xz
     if b * b + yz * yz + xy * xy > u * u + v * v + w * w:
         u, v, w = xy, b, yz
     if c * c + yz * yz + xz * xz > u * u + v * v + w * w:
         u, v, w = xz, yz, c
+    return u, v, w
+
+
+@kernel
+def _orthogonal_to_largest(a, xy, xz, b, yz, c):
+    """Return a unit vector across the longest row of a symmetric matrix (at rank 1, the largest eigenvector)."""
+    u, v, w = _longest_row(a, xy, xz, b, yz, c)
     if abs(u) <= abs(v) and abs(u) <= abs(w):
         x, y, z = 0.0, w, -v
     elif abs(v) <= abs(w):
