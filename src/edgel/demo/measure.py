@@ -94,7 +94,7 @@ def _measure_once(scan: Scan, edges: PaperEdges) -> Times:
     index = build_index(xyz)
     return Times(
         all_normals=_seconds(lambda: estimate_normals(scan.cloud, num_neighbors=NUM_NEIGHBORS)),
-        edge_normals=_seconds(lambda: estimate_normals(scan.cloud, at=rows, num_neighbors=NUM_NEIGHBORS)),
+        edge_normals=stages["normals"],
         index=_seconds(lambda: build_index(xyz)),
         all_fits=_seconds(lambda: fit_planes(index, index, NUM_NEIGHBORS)),
         edge_fits=_seconds(lambda: plane_fits(index, xyz[rows], NUM_NEIGHBORS)),
