@@ -171,7 +171,7 @@ def _scene_rows(job: tuple[str, dict[str, dict[str, Any]]]) -> list[dict[str, An
         print(f"skipped: {name}: {error}", flush=True)
         return []
     rows = []
-    best = accuracy.ceiling(scene) if len(accuracy.target(scene, accuracy.ALL).strong) else None
+    ceiling = accuracy.ceiling(scene) if len(accuracy.target(scene, accuracy.ALL).strong) else None
     for rival in RIVALS:
         if rival.missing() is not None or (rival.organized_only and not scene.cloud.is_organized):
             continue
@@ -191,7 +191,7 @@ def _scene_rows(job: tuple[str, dict[str, dict[str, Any]]]) -> list[dict[str, An
                     "method": rival.name,
                     "variant": variant,
                     "seconds": found.seconds,
-                    "ceiling": best,
+                    "ceiling": ceiling if rival.name == "edgel default" else None,
                 }
                 | accuracy.score(scene, found.mask, found.kind, rival.finds)
             )

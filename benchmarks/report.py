@@ -149,7 +149,9 @@ def _ceilings(rows: Sequence[Row]) -> str:
                 rows,
                 "edgel default",
                 "defaults",
-                lambda r, n=noise, p=pattern: r["view"] == p and r["noise"] == n and r["outliers"] == 0 and "all" in r,
+                lambda r, n=noise, p=pattern: (
+                    r["view"] == p and r["noise"] == n and r["outliers"] == 0 and r.get("ceiling")
+                ),
             )
             line += [
                 _cell(_mean(r["all"]["f1@1.0"] for r in picked)),
