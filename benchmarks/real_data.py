@@ -20,29 +20,34 @@ SKIP = {"malformed"}  # broken on purpose: the tests read them
 SIZE = (560, 420)
 
 REMARKS = {
-    "airborne": "The default draws the border of the flat tile and the roof lines; tree crowns are speckled with false "
-    "edges. The paper marks wide bands: at this density its pixels are metres wide. `interesting.las`, the COPC and the "
-    "UTM file are a thousand points spread over a town, several spacings to the next house: nothing to find.",
-    "kinect_objects": "Depth quantised to steps of some millimetres: the default shows the outlines of the boxes and their "
-    "shadows, and short false dashes all over the table where the steps are. The paper "
-    "marks the outlines as wide bands and nothing inside.",
-    "kinect_organized": "As above. `organized_edge_1` is a rendered, noise-free frame: there the default finds the "
-    "outlines and the folds. The paper finds the outlines only.",
-    "lidar_sweeps": "Points lie on rings far apart: for the default nearly every ring is a boundary, for the paper every "
-    "pixel beside a ring is an edge. Both are useless here.",
-    "roofs": "About a thousand points a roof. The default finds the eaves and parts of the ridges with much noise. "
+    "airborne": "The default draws the border of the flat tile, the bridge and the breaks of the slopes; tree crowns are "
+    "speckled with false edges. The paper marks wide bands: at this density its pixels are metres wide. "
+    "`interesting.las`, the COPC and the UTM file are a thousand points spread over a town, several spacings "
+    "to the next house: nothing to find.",
+    "kinect_objects": "Depth quantised to steps of some millimetres: the default shows the outlines of the boxes and both sides "
+    "of their shadows, and short false creases all over the table where the steps are. The paper marks the "
+    "outlines as wide bands and nothing inside.",
+    "kinect_organized": "As above. `organized_edge_1` is a rendered, noise-free frame: there the default finds the outlines and "
+    "the folds. The paper finds the outlines only.",
+    "lidar_sweeps": "The default knows the spinning sensor by its 32 rings and sees the sweep as it did: near and far sides "
+    "of depth steps, and the end of the ground about the car. Creases between rings are mostly false: a "
+    "ring's neighbours lie on the ring. It takes 15 s, since thousands of shots without an echo lie at one "
+    "place, the origin. For the paper every pixel beside a ring is an edge.",
+    "roofs": "About a thousand points a roof. The default finds most of the eaves and parts of the ridges, with gaps. "
     "The paper's image is 8 pixels wide.",
-    "scan_vs_mesh": "The scans (`.npy`) have noise of one spacing: what the default finds is scattered at random, the paper finds "
-    "broad bands at the silhouette. The meshes (`.ply`) are vertices of large triangles, no scans: nearly all are called edges.",
-    "structured_light": "The paper's kind of sensor. The default follows the outlines of the parts in the bin and their "
-    "occlusions, with false creases from noise where the bin's walls are far and slanted. The paper finds the same outlines as bands, and with them "
-    "every hole.",
+    "scan_vs_mesh": "The scans (`.npy`) have noise of one spacing: what the default finds is scattered at random, the paper "
+    "finds broad bands at the silhouette. The meshes (`.ply`) are vertices of large triangles, no scans: "
+    "nearly all are called edges.",
+    "structured_light": "The paper's kind of sensor. The default follows the outlines of the parts in the bin, both sides of each "
+    "step in depth, the screw heads, and the ragged ends of the surface where the sensor saw nothing; few "
+    "false creases. The paper finds the outlines as bands, and with them every hole.",
     "truth": "Whole parts, sampled all round: the paper's single view from above can't see most edges and marks what "
-    "changes height. The default follows sharp creases, on thin plates too (`abc_7034`), but leaves gaps where several meet "
-    "(`abc_7010`), misses soft ones (`shrec_01`) and most under noise (`abc_noise_*`): its neighbourhoods are of fixed size.",
-    "two_depth_sensors": "Ensenso: noise above a tenth of the spacing, so the default is speckled all over; outlines are "
-    "there but drown. PrimeSense: depth steps show as rings. The paper marks the box only on its high side: the step "
-    "on the other is below the threshold.",
+    "changes height. The default follows sharp creases, on thin plates too (`abc_7034`); it calls small "
+    "rounded knobs edges (`abc_7010`), finds about half of soft feature lines (`shrec_*`) and hardly any of "
+    "the softest (`shrec_01`), and under noise it leaves gaps (`abc_noise_*`).",
+    "two_depth_sensors": "Ensenso: noise above a tenth of the spacing and correlated from pixel to pixel, so the default is "
+    "speckled with false creases; outlines are there. PrimeSense: depth steps show as rings. The paper marks "
+    "the box only on its high side: the step on the other is below the threshold.",
 }
 
 INTRO = """# Real data
