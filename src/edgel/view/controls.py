@@ -60,6 +60,8 @@ class Controls:
             self.crop = [gui.add_multi_slider(f"{axis} (%)", 0, 100, 1, (0, 100), min_range=1) for axis in "xyz"]
             self.whole = gui.add_button("Whole cloud")
         self.images = gui.add_folder("The paper's images", visible=False)
+        with self.images:
+            self.pictures = gui.add_html("")
         with gui.add_folder("Clicked point"):
             self.numbers = gui.add_html(texts.numbers(None))
         with gui.add_folder("Save and repeat"):

@@ -17,7 +17,7 @@ from edgel.view.commands import command_line, python_lines
 from edgel.view.controls import Controls
 from edgel.view.latest import Latest
 from edgel.view.pick import describe, pick
-from edgel.view.save import edges_file, picture_file
+from edgel.view.save import edges_file, picture_file, png
 from edgel.view.session import Pane, Session
 
 _CLICK = 8  # pixels that a click may miss an edge point by
@@ -33,9 +33,8 @@ class Page:
     def __init__(self, server: viser.ViserServer, session: Session) -> None:
         self._session = session
         self._lock = threading.Lock()
-        self._images: dict[str, tuple[Any, viser.GuiImageHandle]] = {}
+        self._images: dict[str, PaperEdges] = {}
         self._panes: list[Pane] = []
-        self._server = server
         server.gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
         server.gui.set_panel_label("edgel view")
         server.gui.main_panel.dock_right()
@@ -95,25 +94,16 @@ class Page:
 
     def _show_images(self, panes: list[Pane]) -> None:
         """Show the projection and the edge map of each pane of the published method."""
-        wanted: dict[str, tuple[Any, np.ndarray]] = {}
-        for pane in panes:
-            found = None if pane.answer is None else pane.answer.edges
-            if isinstance(found, PaperEdges):
-                for what, image in (("projection", found.image), ("edge map", found.edge_map * 255.0)):
-                    wanted[f"{pane.source.name}: {what}"] = (pane.run, image[::-1])
-        for name in [name for name in self._images if name not in wanted]:
-            self._images.pop(name)[1].remove()
-        for name, (run, image) in wanted.items():
-            if name in self._images and self._images[name][0] == run:
-                continue
-            picture = image.astype(np.uint8)[..., None].repeat(3, axis=2)
-            if name in self._images:
-                handle = self._images[name][1]
-                handle.image = picture
-            else:
-                with self._controls.images:
-                    handle = self._server.gui.add_image(picture, label=name, format="png")
-            self._images[name] = run, handle
+        found = {pane.source.name: pane.answer.edges for pane in panes if pane.answer is not None}
+        wanted = {name: edges for name, edges in found.items() if isinstance(edges, PaperEdges)}
+        if wanted == self._images:  # Edges are equal if they are the same
+            return
+        self._images = wanted
+        pictures = {}
+        for name, edges in wanted.items():
+            for what, image in (("projection", edges.image), ("edge map", edges.edge_map * 255)):
+                pictures[f"{name}: {what}"] = png(image[::-1].astype(np.uint8))
+        self._controls.pictures.content = texts.pictures(pictures)
 
     def _click(self, event: viser.SceneClickEvent) -> None:
         """Show the numbers of the edge point that was clicked."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -67,3 +68,12 @@ def picture_file(pane: Pane, direction: np.ndarray, settings: Settings) -> tuple
     with tempfile.TemporaryDirectory() as folder:
         plot.save(Path(folder) / name, picture)
         return name, (Path(folder) / name).read_bytes()
+
+
+def png(grey: np.ndarray) -> bytes:
+    """Encode an image (H, W) uint8."""
+    from PIL import Image
+
+    content = io.BytesIO()
+    Image.fromarray(grey).save(content, format="PNG")
+    return content.getvalue()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from html import escape
 
@@ -76,6 +77,16 @@ def numbers(values: Mapping[str, str] | None) -> str:
         for name, value in values.items()
     )
     return f"<div class='edgel-point' style='{_BOX}'><table>{rows}</table></div>"
+
+
+def pictures(images: Mapping[str, bytes]) -> str:
+    """Show PNG images under their names; inside the page, since viser's own fail when they change too soon."""
+    parts = [
+        f"<div>{escape(name)}</div>"
+        f"<img alt='{escape(name)}' style='width:100%' src='data:image/png;base64,{b64encode(content).decode()}'>"
+        for name, content in images.items()
+    ]
+    return f"<div style='{_BOX}'>{''.join(parts)}</div>"
 
 
 def code(blocks: Mapping[str, str]) -> str:
