@@ -5,7 +5,7 @@ Run: python benchmarks/view_latency.py [POINTS...]. Medians of ten moves of the 
 - server: from the new setting to everything handed to viser, without a browser
 - count: in Chromium, from the key to the new number of edges on the page
 - picture: in Chromium, from the key to the second frame after that, which shows the new edges
-- frame: what Chromium needs to draw one frame of the cloud. Here it draws in software; with a GPU this is a few ms.
+- frame: what Chromium needs to draw one frame of the cloud, in software.
 """
 
 from __future__ import annotations

@@ -41,8 +41,8 @@ def shoot(browser: Any, name: str, folder: Path, files: list[str], act: Callable
             close.first.click()
         act(page, session)
         session.wait_idle(PATIENCE / 1000)
-        settle(page)
         page.mouse.move(SIZE["width"] - 20, SIZE["height"] - 10)
+        settle(page)
         picture_of_page = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
         page.close()
     # 256 colors, and a third of the size.

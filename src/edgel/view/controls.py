@@ -53,7 +53,7 @@ class Controls:
             self.coloring: Any = gui.add_dropdown("Color cloud by", (Coloring.GREY.value,))
             self.edge_colors = gui.add_dropdown("Color edges by", _EDGE_COLORS)
             self.tangents = gui.add_checkbox("Tangents", False, hint="Green segments along the edge")
-            self.normals = gui.add_checkbox("Normals", False, hint="Segments: black one face's, brown the other's")
+            self.normals = gui.add_checkbox("Normals", False, hint="Segments: grey one face's, ochre the other's")
             self.size = gui.add_slider("Point size", 0.5, 4.0, 0.1, 1.0)
             self.look = gui.add_button("Show everything", hint="Put the camera back to where it began")
         with gui.add_folder("Crop", expand_by_default=False):
