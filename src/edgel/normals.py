@@ -209,7 +209,8 @@ def smallest_eigenpair(xx, xy, xz, yy, yz, zz):
     angle = math.acos(min(max(det / (2.0 * p * p * p), -1.0), 1.0)) / 3.0
     largest = mean + 2.0 * p * math.cos(angle)
     smallest = mean + 2.0 * p * math.cos(angle + 2.0943951023931953)
-    x, y, z = _orthogonal_to_largest(xx - smallest, xy, xz, yy - smallest, yz, zz - smallest)
+    # At rank 1 the longest row is the largest eigenvector.
+    x, y, z = across(*_longest_row(xx - smallest, xy, xz, yy - smallest, yz, zz - smallest))
     for step in range(4):
         a, b, c = xx - smallest, yy - smallest, zz - smallest
         # Every column of the adjugate of A - lambda I points along the eigenvector; the longest is the safest.
@@ -250,9 +251,8 @@ def _longest_row(a, xy, xz, b, yz, c):
 
 
 @kernel
-def _orthogonal_to_largest(a, xy, xz, b, yz, c):
-    """Return a unit vector across the longest row of a symmetric matrix (at rank 1, the largest eigenvector)."""
-    u, v, w = _longest_row(a, xy, xz, b, yz, c)
+def across(u, v, w):
+    """Return a unit vector across another one (of a vector of no length, +X)."""
     if abs(u) <= abs(v) and abs(u) <= abs(w):
         x, y, z = 0.0, w, -v
     elif abs(v) <= abs(w):
@@ -261,5 +261,12 @@ def _orthogonal_to_largest(a, xy, xz, b, yz, c):
         x, y, z = v, -u, 0.0
     length = math.sqrt(x * x + y * y + z * z)
     if length == 0.0:
-        return 0.0, 0.0, 1.0
+        return 1.0, 0.0, 0.0
     return x / length, y / length, z / length
+
+
+@kernel
+def tangents(nx, ny, nz):
+    """Return two unit vectors across a unit normal and each other."""
+    x, y, z = across(nx, ny, nz)
+    return x, y, z, ny * z - nz * y, nz * x - nx * z, nx * y - ny * x

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from edgel.normals import tangents
 from edgel.parallel import kernel
 
 TIE = 1e-6  # relative difference below which rounding would decide
@@ -53,7 +54,7 @@ def color_gradient(first, places, squared, queries, query_order, xyz, normals, s
         if not n[0] * n[0] + n[1] * n[1] + n[2] * n[2] > 0.5 or squared[q, k - 1] == 0.0:
             continue
         radius = math.sqrt(squared[q, k - 1])
-        ux, uy, uz, vx, vy, vz = _tangents(n[0], n[1], n[2])
+        ux, uy, uz, vx, vy, vz = tangents(n[0], n[1], n[2])
         total, ma, mb, aa, ab, bb = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         means[:], slopes[:] = 0.0, 0.0
         for i in range(k):
@@ -104,17 +105,3 @@ def biweight(squared, largest):
     """Biweight kernel: its standard deviation along an axis is 0.35 of the radius."""
     share = 1.0 - squared / largest if largest > 0.0 else 1.0
     return share * share
-
-
-@kernel
-def _tangents(nx, ny, nz):
-    """Return two unit vectors across a unit normal and each other."""
-    if abs(nx) <= min(abs(ny), abs(nz)):
-        x, y, z = 0.0, nz, -ny
-    elif abs(ny) <= abs(nz):
-        x, y, z = -nz, 0.0, nx
-    else:
-        x, y, z = ny, -nx, 0.0
-    length = math.sqrt(x * x + y * y + z * z)
-    x, y, z = x / length, y / length, z / length
-    return x, y, z, ny * z - nz * y, nz * x - nx * z, nx * y - ny * x

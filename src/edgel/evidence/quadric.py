@@ -6,33 +6,18 @@ import math
 
 import numpy as np
 
+from edgel.normals import tangents
 from edgel.parallel import kernel, summing_kernel
 
 _STIFF = 1e-4  # on the diagonal, so that what the neighbours leave open is small
-
-
-@kernel
-def tangent(nx, ny, nz):
-    """Return a unit vector across a unit normal."""
-    if abs(nx) <= abs(ny) and abs(nx) <= abs(nz):
-        x, y, z = 0.0, nz, -ny
-    elif abs(ny) <= abs(nz):
-        x, y, z = -nz, 0.0, nx
-    else:
-        x, y, z = ny, -nx, 0.0
-    length = math.sqrt(x * x + y * y + z * z)
-    if length == 0.0:
-        return 1.0, 0.0, 0.0
-    return x / length, y / length, z / length
 
 
 @summing_kernel
 def _powers(vectors, count, normal, radius, sums):
     """Sum the powers of x and y up to the fourth over the tangent plane, in radii, and those times z: `sums` (22,)."""
     nx, ny, nz = normal[0] / radius, normal[1] / radius, normal[2] / radius
-    ux, uy, uz = tangent(normal[0], normal[1], normal[2])
-    ux, uy, uz = ux / radius, uy / radius, uz / radius
-    vx, vy, vz = (ny * uz - nz * uy) * radius, (nz * ux - nx * uz) * radius, (nx * uy - ny * ux) * radius
+    ux, uy, uz, vx, vy, vz = tangents(normal[0], normal[1], normal[2])
+    ux, uy, uz, vx, vy, vz = ux / radius, uy / radius, uz / radius, vx / radius, vy / radius, vz / radius
     xs, ys, zs = vectors[0], vectors[1], vectors[2]
     sx, sy, sxx, sxy, syy = 0.0, 0.0, 0.0, 0.0, 0.0
     sxxx, sxxy, sxyy, syyy = 0.0, 0.0, 0.0, 0.0

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from edgel.evidence.quadric import tangent
+from edgel.normals import tangents
 from edgel.parallel import kernel
 
 COUNTS = (16, 32, 96)
@@ -25,8 +25,7 @@ def sector_gaps(vectors, squared, normals, counts, first, last, features):
     for s in range(len(counts)):
         normal = normals[min(s + 1, len(normals) - 1)]
         nx, ny, nz = normal[0], normal[1], normal[2]
-        ux, uy, uz = tangent(nx, ny, nz)
-        vx, vy, vz = ny * uz - nz * uy, nz * ux - nx * uz, nx * uy - ny * ux
+        ux, uy, uz, vx, vy, vz = tangents(nx, ny, nz)
         first[:] = np.inf
         last[:] = -np.inf
         for i in range(min(counts[s], vectors.shape[1])):

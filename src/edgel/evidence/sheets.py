@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
-from edgel.evidence.quadric import fit_quadric, tangent
-from edgel.normals import smallest_eigenpair
+from edgel.evidence.quadric import fit_quadric
+from edgel.normals import smallest_eigenpair, tangents
 from edgel.parallel import kernel, summing_kernel
 
 ROUNDS = 3
@@ -114,8 +114,7 @@ def _refine(vectors, count, whole, start, sheets, room):
 def _across_bend(normal, quadric, start):
     """Put the plane through the point across the direction in which the quadric bends most into `start` (4,)."""
     nx, ny, nz = normal[0], normal[1], normal[2]
-    ux, uy, uz = tangent(nx, ny, nz)
-    vx, vy, vz = ny * uz - nz * uy, nz * ux - nx * uz, nx * uy - ny * ux
+    ux, uy, uz, vx, vy, vz = tangents(nx, ny, nz)
     angle = 0.5 * math.atan2(quadric[4], quadric[3] - quadric[5])
     c, s = math.cos(angle), math.sin(angle)
     along = quadric[3] * c * c + quadric[4] * c * s + quadric[5] * s * s
