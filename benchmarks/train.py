@@ -69,12 +69,13 @@ def main() -> None:
         save(GLANCES, glances)
         for done, path in enumerate(pool.imap(prepare, range(options.scenes)), start=1):
             print(f"\r{done} of {options.scenes} scenes: {path.name}", end="", flush=True)
-    features, labels, weights = (np.concatenate(part) for part in zip(*map(load, range(options.scenes)), strict=True))
-    half = np.concatenate([np.full(len(load(seed)[2]), seed % 2) for seed in range(options.scenes)])
+    parts = list(map(load, range(options.scenes)))
+    half = np.concatenate([np.full(len(part[2]), seed % 2) for seed, part in enumerate(parts)])
+    features, labels, weights = (np.concatenate(part) for part in zip(*parts, strict=True))
     print(f"\n{len(features):,} points, {labels[:, 0].sum():,} on creases, {labels[:, 1].sum():,} on outlines")
     for name, array in {"features": features, "labels": labels, "weights": weights, "half": half}.items():
         np.save(CACHE / f"{name}.npy", array)
-    del features
+    del features, parts
     whole = [(f"first {kind}", FIRST[kind], None) for kind in KINDS]
     apart = [(f"first {kind}", FIRST[kind], other) for kind in KINDS for other in (0, 1)]
     with get_context("spawn").Pool(2, initializer=one_thread) as pool:

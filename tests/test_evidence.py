@@ -125,14 +125,15 @@ def test_context_hears_the_neighbours_along_and_beside_the_edge():
     """On a grid, one row of sure points: seen from it, sure ones lie ahead and behind and none beside."""
     x, y = np.meshgrid(np.arange(21.0), np.arange(21.0))
     index = build_index(np.column_stack([x.ravel(), y.ravel(), 0 * x.ravel()]))
-    chance = np.select([index.xyz[1] == 10, index.xyz[1] == 11], [0.9, 0.3]).astype(np.float32)
+    chances = np.zeros((2, len(index)), np.float32)
+    chances[0] = np.select([index.xyz[1] == 10, index.xyz[1] == 11], [0.9, 0.3])
     slot = np.full(len(index), -1, np.int32)
-    features = np.zeros((2, context.NUM_FEATURES), np.float32)
+    features = np.zeros((2, 2, context.NUM_FEATURES), np.float32)
     queries = build_index(np.array([[10.0, 10, 0], [10, 11, 0]]))
     nowhere = np.zeros((1, 3), np.float32)
-    arguments = (chance, 0 * chance, slot, nowhere, nowhere, features)
+    arguments = (chances, slot, nowhere, nowhere, features)
     visit_neighbors(context.look_around, queries, index, context.NEIGHBORS + 1, *arguments)
-    sure, faint = features
+    sure, faint = features[0]
     assert sure[[0, 3, 4, 5]] == pytest.approx([0.9, 0.9, 0.9, 0.3], abs=1e-6)  # itself, and the best of the 8 around
     assert sure[6] == pytest.approx((2 * 0.9 + 3 * 0.3) / 8, abs=1e-6)
     assert sure[[11, 12]] == pytest.approx([0.9, 0.9], abs=1e-6)

@@ -28,14 +28,12 @@ def levels(values: np.ndarray, weak: float, least: int) -> np.ndarray:
     (H, W) float64
         0 where no threshold above `FAINTEST` keeps the pixel.
     """
-    found = np.zeros(values.shape)
     padded = np.pad(values, 1).ravel()
     shown = np.flatnonzero(padded >= weak * FAINTEST)
     order = shown[np.argsort(-padded[shown], kind="stable")]
-    inner = np.zeros(len(padded))
-    _join(order, padded, values.shape[1] + 2, weak, least, inner)
-    found[:] = inner.reshape(values.shape[0] + 2, -1)[1:-1, 1:-1]
-    return found
+    found = np.zeros(len(padded))
+    _join(order, padded, values.shape[1] + 2, weak, least, found)
+    return found.reshape(values.shape[0] + 2, -1)[1:-1, 1:-1]
 
 
 @kernel

@@ -21,8 +21,9 @@ from edgel.viewing import METHODS, look
 
 PRESETS = ("default", "paper")
 DEFAULT_KINDS = EdgeKind.BOUNDARY | EdgeKind.OCCLUDING | EdgeKind.OCCLUDED | EdgeKind.CREASE
-EVEN = (0.45, 0.5)  # probability of an edge whose strength is a half: least, on the vaguest cloud, and most
-COLOR = 0.2  # contrast of a color edge whose strength is a half
+LIKELY = 0.5  # strength of an edge that is as likely as not
+EVEN = (0.45, 0.5)  # probability of an edge that is as likely as not: least, on the vaguest cloud, and most
+COLOR = 0.2  # contrast of a color edge that is as likely as not
 
 
 def detect(
@@ -31,7 +32,7 @@ def detect(
     preset: Literal["default", "paper"] = "default",
     kinds: EdgeKind | str | Iterable[str] = DEFAULT_KINDS,
     method: Literal["auto", "surface", "organized", "orthographic", "pinhole", "spherical"] = "auto",
-    min_strength: float = 0.5,
+    min_strength: float = LIKELY,
     num_neighbors: int = 16,
     viewpoint: Any = None,
     progress: Callable[[str], None] | None = None,
@@ -95,7 +96,7 @@ def detect(
             raise ValueError("kinds: the paper tells no kinds of edge apart; leave it out, or use the default preset")
         if method != "auto":
             raise ValueError("method: the paper has its own, along Z; leave it out, or use the default preset")
-        if min_strength != 0.5:
+        if min_strength != LIKELY:
             raise ValueError("min_strength: the paper has thresholds of its own, see edgel.paper.detect; leave it out")
         if viewpoint is not None:
             raise ValueError("viewpoint: the paper turns normals by D > 0; leave it out, or use the default preset")
@@ -177,7 +178,7 @@ def strength(probability: np.ndarray) -> np.ndarray:
 
 def color_strength(contrast: np.ndarray) -> np.ndarray:
     """Turn contrasts into strengths, a sure edge's threshold to one half; its fainter parts have that too."""
-    return np.where(contrast > 0, np.maximum(contrast / (contrast + COLOR), 0.5), 0)
+    return np.where(contrast > 0, np.maximum(contrast / (contrast + COLOR), LIKELY), 0)
 
 
 class Marks:
@@ -194,7 +195,7 @@ class Marks:
     def mark(self, rows: np.ndarray, kind: EdgeKind | np.ndarray, strength: np.ndarray) -> None:
         """Add a kind (one, or (M,) flags) at rows (M,), with its strength (M,)."""
         before, flags = self.strength[rows], np.where(strength > 0, kind, 0).astype(np.uint8)
-        both = (before >= 0.5) & (strength >= 0.5)
+        both = (before >= LIKELY) & (strength >= LIKELY)
         self.kind[rows] = np.where(both, self.kind[rows] | flags, np.where(strength > before, flags, self.kind[rows]))
         self.strength[rows] = np.maximum(before, strength)
 

@@ -44,6 +44,10 @@ class NeighborIndex:
     def __len__(self) -> int:
         return len(self.order)
 
+    def at(self, places: np.ndarray) -> np.ndarray:
+        """Return the sorted points at some places (M,), (M, 3) float64."""
+        return np.ascontiguousarray(self.xyz[:, places].T)
+
 
 def build_index(xyz: np.ndarray) -> NeighborIndex:
     """Sort points for neighbour queries.

@@ -102,15 +102,10 @@ def render(
 
     Parameters
     ----------
-    points : (N, 3) or (H, W, 3) array_like, Cloud, or an object that carries points
-        Points that are not finite are left out; a few far outliers may fall outside the picture.
+    points, direction, size, background
+        As for `picture`.
     rows_on_top : (E,) int or (N,) bool, optional
         Rows drawn red: the edge points. Those hidden behind nearer parts of the cloud are not drawn.
-    direction : {"auto", "top", "oblique", "sensor"} or (3,) array_like
-        ``"top"`` looks down -Z as the paper does, ``"sensor"`` from the cloud's viewpoint, ``"oblique"`` from the front
-        and above; ``"auto"`` takes the sensor's view where there is one. A vector points away from the viewer.
-    size : (int, int)
-        Width and height, in pixels.
     crop : bool
         Make the picture no larger than the cloud needs.
     margin : float
@@ -121,8 +116,6 @@ def render(
         Radius of a point, in pixels; by default chosen from the spacing, so that dense clouds have no holes.
     greys : (int, int)
         Grey of the darkest and of the lightest slope, 0 to 255.
-    background : {"light", "dark"}
-        What the picture is drawn on.
 
     Returns
     -------

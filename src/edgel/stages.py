@@ -18,13 +18,13 @@ class Stages:
 
     def __init__(self, progress: Callable[[str], None] | None = None) -> None:
         self.seconds: dict[str, float] = {}
-        self._progress = progress
+        self.progress = progress
 
     @contextmanager
     def __call__(self, name: str) -> Iterator[None]:
         """Time what happens inside a ``with`` under this name."""
-        if self._progress is not None:
-            self._progress(name)
+        if self.progress is not None:
+            self.progress(name)
         start = time.perf_counter()
         try:
             yield

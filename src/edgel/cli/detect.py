@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -110,11 +111,7 @@ def detect(
         files.check_input(source, intrinsics)
         with Watch() as watch:
             stages = Stages(watch)
-            with stages("reading"):
-                cloud = files.read_cloud(source, intrinsics)
-            with failing_as(ExitCode.DATA, source, arguments(preset)):
-                edges = FUNCTIONS[preset](cloud, **given, progress=watch)
-            stages.seconds.update(edges.seconds)
+            cloud, edges = read_and_detect(source, intrinsics, preset, given, stages)
             if output is not None:
                 with stages("writing"):
                     files.write_cloud(output, edges.label(cloud) if label_all else edges.cloud(cloud))
@@ -159,6 +156,18 @@ def check_options(preset: str, given: dict[str, Any]) -> dict[str, Any]:
 def arguments(preset: str) -> set[str]:
     """Return the names of the arguments that a preset has beside the points."""
     return set(inspect.signature(FUNCTIONS[preset]).parameters) - {"points"}
+
+
+def read_and_detect(
+    source: str, intrinsics: str | None, preset: str, given: Mapping[str, Any], stages: Stages
+) -> tuple[edgel.Cloud, Edges]:
+    """Read a cloud and find its edges, with the options that `check_options` let through."""
+    with stages("reading"):
+        cloud = files.read_cloud(source, intrinsics)
+    with failing_as(ExitCode.DATA, source, arguments(preset)):
+        edges = FUNCTIONS[preset](cloud, **given, progress=stages.progress)
+    stages.seconds.update(edges.seconds)
+    return cloud, edges
 
 
 def check_outputs(output: str | None, report: str | None, *, label_all: bool, as_json: bool) -> None:

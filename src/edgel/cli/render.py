@@ -9,7 +9,7 @@ import typer
 
 from edgel.camera import DIRECTIONS
 from edgel.cli import files, options
-from edgel.cli.detect import FUNCTIONS, arguments, check_options
+from edgel.cli.detect import arguments, check_options, read_and_detect
 from edgel.cli.errors import ExitCode, Failure, exit_codes, failing_as
 from edgel.cli.output import count, print_line, print_table, seconds
 from edgel.cli.progress import Watch
@@ -80,11 +80,7 @@ def render(
         files.check_input(source, intrinsics)
         with Watch() as watch:
             stages = Stages(watch)
-            with stages("reading"):
-                cloud = files.read_cloud(source, intrinsics)
-            with failing_as(ExitCode.DATA, source, arguments(preset)):
-                edges = FUNCTIONS[preset](cloud, **given, progress=watch)
-            stages.seconds.update(edges.seconds)
+            cloud, edges = read_and_detect(source, intrinsics, preset, given, stages)
             if min_strength is not None:  # the published method does not leave any out itself
                 edges = edges.take(edges.strength >= min_strength)
             with stages("drawing"), failing_as(ExitCode.DATA, source, look):

@@ -37,6 +37,7 @@ MIN_TURN = math.radians(12.0)  # of two planes that make an edge
 _CENSUS = 8_000  # points that say what is typical of the cloud
 _BLOCK = 65_536  # points whose evidence is held at a time
 _FLOOR = 0.02  # spacings: residuals below it do not make one fit better than another
+_COS_MIN = math.cos(math.radians(20.0))  # of two planes through a point, whose angle is at least this
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +140,7 @@ def survey(index: NeighborIndex, trees: Mapping[str, Forest] | None = None) -> S
     if len(places):
         visit_neighbors(
             gather.survey,
-            build_index(np.ascontiguousarray(index.xyz[:, places].T)),
+            build_index(index.at(places)),
             index,
             min(SCALES[-1], len(index)),
             places,
@@ -158,7 +159,7 @@ def survey(index: NeighborIndex, trees: Mapping[str, Forest] | None = None) -> S
 def describe(index: NeighborIndex, places: np.ndarray) -> np.ndarray:
     """Return the cheap evidence (M, NUM_CHEAP - NUM_CLOUD) float32 of the points at some places (M,) of the index."""
     features = np.zeros((len(places), scales.NUM_FEATURES), np.float32)
-    queries = build_index(np.ascontiguousarray(index.xyz[:, places].T))
+    queries = build_index(index.at(places))
     visit_neighbors(gather.describe, queries, index, min(SCALES[-1], len(index)), np.array(SCALES), features)
     return features
 
@@ -241,20 +242,10 @@ def look_around(
     lines, feet = np.ascontiguousarray(evidence.fit[:, 6:9]), np.ascontiguousarray(evidence.fit[:, 9:12])
     around = np.zeros((2, len(places), context.NUM_FEATURES), np.float32)
     if len(places):
-        queries = build_index(np.ascontiguousarray(index.xyz[:, places].T))
-        for kind in (0, 1):
-            visit_neighbors(
-                context.look_around,
-                queries,
-                index,
-                min(context.NEIGHBORS + 1, len(index)),
-                chances[kind],
-                chances[1 - kind],
-                slot,
-                lines,
-                feet,
-                around[kind],
-            )
+        k = min(context.NEIGHBORS + 1, len(index))
+        visit_neighbors(
+            context.look_around, build_index(index.at(places)), index, k, chances, slot, lines, feet, around
+        )
     return np.concatenate([evidence.features, *around], axis=1)
 
 
@@ -265,7 +256,7 @@ def judge(index: NeighborIndex, surveyed: Survey) -> Verdict:
     kept, parts, chances = [], [], []
     for start in range(0, len(likely), _BLOCK):
         places = likely[start : start + _BLOCK]
-        evidence = examine(index, surveyed, np.ascontiguousarray(index.xyz[:, places].T))
+        evidence = examine(index, surveyed, index.at(places))
         first = np.stack([evaluate(trees[f"first {kind}"], evidence.features) for kind in ("crease", "outline")])
         good = np.flatnonzero((first > SECOND).any(axis=0))
         kept.append(places[good])
@@ -289,6 +280,3 @@ def forests() -> dict[str, Forest]:
     """Return the trees of the package, trained by benchmarks/train.py on scenes of `edgel.synth` alone."""
     with (files("edgel.evidence") / WEIGHTS).open("rb") as file:
         return read_forests(file)
-
-
-_COS_MIN = math.cos(math.radians(20.0))

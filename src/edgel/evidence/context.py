@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from edgel.evidence.gather import relative
 from edgel.evidence.scales import spacing_of
 from edgel.normals import smallest_eigenpair
 from edgel.parallel import kernel
@@ -22,35 +23,39 @@ _SAME_LINE = 0.35  # spacings between lines that two points beside each other pu
 
 
 @kernel
-def look_around(first, places, squared, queries, query_order, xyz, chance, other, slot, lines, feet, features):
-    """Describe the chances of a kind of edge around some points.
+def look_around(first, places, squared, queries, query_order, xyz, chances, slot, lines, feet, features):
+    """Describe the chances of each of two kinds of edge around some points.
 
-    Parameters: the chance of that kind and of the other at every sorted point, (N,) float32; which row of `lines` and
-    `feet` (M, 3), the direction of its line and the line's place nearest to it, is its own, (N,) int32, -1 for none.
-    Writes `features` (Q, 19).
+    Parameters: the chance of either kind at every sorted point, (2, N) float32; which row of `lines` and `feet` (M, 3),
+    the direction of its line and the line's place nearest to it, is its own, (N,) int32, -1 for none. Writes `features`
+    (2, Q, 19).
     """
-    k = places.shape[1]
-    away = np.empty((3, k))
+    away = np.empty((3, places.shape[1]))
     for q in range(places.shape[0]):
-        out = features[query_order[first + q]]
-        out[:] = 0.0
-        spacing = spacing_of(squared[q])
+        row, spacing = query_order[first + q], spacing_of(squared[q])
         if spacing == 0.0:
+            features[:, row] = 0.0
             continue
-        for axis in range(3):
-            for i in range(k):
-                away[axis, i] = (xyz[axis, places[q, i]] - queries[axis, first + q]) / spacing
-        own = chance[places[q, 0]]
-        tx, ty, tz, line_like = _main_direction(places[q], away, chance)
-        s = slot[places[q, 0]]
-        agree = 0.0
-        if s >= 0:
-            agree = abs(lines[s, 0] * tx + lines[s, 1] * ty + lines[s, 2] * tz)
-        out[0], out[1], out[2] = own, line_like, agree
-        _sums(places[q], chance, other, out)
-        _along_and_across(places[q], away, chance, tx, ty, tz, own, out)
-        if s >= 0:
-            _along_and_across_line(places[q], away, chance, slot, lines, feet, s, spacing, out)
+        relative(places[q], queries, first + q, xyz, away)
+        away /= spacing
+        for kind in range(2):
+            _describe(
+                places[q], away, spacing, chances[kind], chances[1 - kind], slot, lines, feet, features[kind, row]
+            )
+
+
+@kernel
+def _describe(places, away, spacing, chance, other, slot, lines, feet, out):
+    """Describe the chances of one kind of edge around a point."""
+    out[:] = 0.0
+    own, s = chance[places[0]], slot[places[0]]
+    tx, ty, tz, line_like = _main_direction(places, away, chance)
+    agree = abs(lines[s, 0] * tx + lines[s, 1] * ty + lines[s, 2] * tz) if s >= 0 else 0.0
+    out[0], out[1], out[2] = own, line_like, agree
+    _sums(places, chance, other, out)
+    _along_and_across(places, away, chance, tx, ty, tz, own, out)
+    if s >= 0:
+        _along_and_across_line(places, away, chance, slot, lines, feet, s, spacing, out)
 
 
 @kernel

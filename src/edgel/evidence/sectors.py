@@ -36,26 +36,26 @@ def sector_gaps(vectors, squared, normals, counts, first, last, features):
                 place = min(int((angle + math.pi) * (BINS / (2.0 * math.pi))), BINS - 1)
                 first[place] = min(first[place], angle)
                 last[place] = max(last[place], angle)
-        widest, second = 2.0 * math.pi, 0.0
-        begin, end = np.inf, -np.inf
-        gap_widest, gap_second = 0.0, 0.0
+        widest, second, begin, end = 0.0, 0.0, np.inf, -np.inf
         for place in range(BINS):
             if last[place] == -np.inf:
                 continue
             if begin == np.inf:
                 begin = first[place]
             else:
-                gap = first[place] - end
-                if gap > gap_widest:
-                    gap_widest, gap_second = gap, gap_widest
-                elif gap > gap_second:
-                    gap_second = gap
+                widest, second = _with_gap(first[place] - end, widest, second)
             end = last[place]
         if begin < np.inf:
-            gap = 2.0 * math.pi - (end - begin)
-            if gap > gap_widest:
-                widest, second = gap, gap_widest
-            else:
-                widest, second = gap_widest, max(gap, gap_second)
+            widest, second = _with_gap(2.0 * math.pi - (end - begin), widest, second)
+        else:
+            widest = 2.0 * math.pi
         features[2 * s] = widest
         features[2 * s + 1] = second
+
+
+@kernel
+def _with_gap(gap, widest, second):
+    """Return the two widest of three gaps."""
+    if gap > widest:
+        return gap, widest
+    return widest, max(gap, second)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from edgel.color.channels import color_channels
+from edgel.color.channels import color_channels, intensity_of, rgb_of
 from edgel.edges import EdgeKind, Edges
 from edgel.palette import kind_colors, ramp_colors
 from edgel.view.settings import Coloring
@@ -34,7 +32,7 @@ def colorings(source: Source) -> list[Coloring]:
         channels = color_channels(source.cloud)
         if channels is not None and channels.shape[1] == 3:
             found.append(Coloring.OWN)
-        if _intensity(source) is not None:
+        if intensity_of(source.cloud) is not None:
             found.append(Coloring.INTENSITY)
     return found
 
@@ -52,14 +50,10 @@ def cloud_colors(source: Source, coloring: Coloring, rotation: np.ndarray) -> np
         Turns directions of the cloud into those of the scene, whose light shades the grey.
     """
     assert source.cloud is not None
-    if coloring is Coloring.OWN:
-        channels = color_channels(source.cloud)
-        if channels is not None and channels.shape[1] == 3:
-            return _rgb(channels[source.shown])
-    if coloring is Coloring.INTENSITY:
-        channel = _intensity(source)
-        if channel is not None:
-            return _ramp(channel, np.array([[20.0] * 3, [245.0] * 3]))
+    if coloring is Coloring.OWN and (rgb := rgb_of(source.cloud)) is not None:
+        return (255 * np.nan_to_num(rgb[source.shown], nan=0.5) + 0.5).astype(np.uint8)
+    if coloring is Coloring.INTENSITY and (intensity := intensity_of(source.cloud)) is not None:
+        return _ramp(intensity[source.shown], np.array([[20.0] * 3, [245.0] * 3]))
     if coloring is Coloring.HEIGHT:
         height = source.cloud.xyz[source.shown] @ rotation[2]
         low, high = np.percentile(height, [1.0, 99.0])
@@ -81,25 +75,6 @@ def edge_colors(edges: Edges, *, by_strength: bool, least: float) -> np.ndarray:
     if edges.preset == "paper":  # its strengths are shares of the largest step there can be: all small
         return ramp_colors(1.0 - edges.strength / edges.strength.max(initial=1e-9))
     return ramp_colors((1.0 - edges.strength) / (1.0 - least))
-
-
-def _intensity(source: Source) -> np.ndarray | None:
-    """Intensity of the points drawn, 0 to 1, None where the file has none."""
-    assert source.cloud is not None
-    attributes = {
-        name: v for name, v in source.cloud.attributes.items() if name.lower() not in ("red", "green", "blue")
-    }
-    channels = color_channels(replace(source.cloud, attributes=attributes))
-    return None if channels is None else channels[source.shown, 0]
-
-
-def _rgb(channels: np.ndarray) -> np.ndarray:
-    """Undo the channels of `edgel.color`: brightness, red against blue, green against magenta."""
-    brightness, red_blue, green = np.nan_to_num(channels, nan=0.5).T
-    red_blue, green = 2 * (red_blue - 0.5), 4 / 3 * (green - 0.5)
-    g = brightness + green
-    rest = brightness - green / 2
-    return (255 * np.clip(np.column_stack([rest + red_blue / 2, g, rest - red_blue / 2]), 0, 1) + 0.5).astype(np.uint8)
 
 
 def _ramp(values: np.ndarray, stops: np.ndarray) -> np.ndarray:

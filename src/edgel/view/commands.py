@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from edgel.detect import DEFAULT_KINDS
+from edgel.detect import DEFAULT_KINDS, LIKELY
 from edgel.edges import kind_names
 from edgel.view.session import Pane
-from edgel.view.settings import STRENGTH, Settings
+from edgel.view.settings import Settings
 
 _HELPERS = ("detect_at_scale", "drop_blunt", "in_box")
 
@@ -32,7 +32,7 @@ def command_line(pane: Pane, settings: Settings) -> str:
             return "# no kind of edge is chosen"
         if settings.kinds != DEFAULT_KINDS:
             words += ["--kinds", ",".join(kind_names(settings.kinds))]
-        if settings.strength != STRENGTH:
+        if settings.strength != LIKELY:
             words += ["--min-strength", f"{settings.strength:g}"]
         missing += ["least angle"] if settings.angle > 0 else []
     missing += ["crop"] if settings.is_cropped else []
@@ -50,7 +50,7 @@ def python_lines(pane: Pane, settings: Settings) -> str:
     options = []
     if default and settings.kinds != DEFAULT_KINDS:
         options.append(f"kinds={kind_names(settings.kinds)!r}")
-    if default and settings.strength != STRENGTH:
+    if default and settings.strength != LIKELY:
         options.append(f"min_strength={settings.strength:g}")
     if not default:
         options.append("preset='paper'")

@@ -8,11 +8,11 @@ from typing import Any
 
 import viser
 
-from edgel.edges import EdgeKind, kind_names
+from edgel.edges import ASKABLE, EdgeKind, kind_names
 from edgel.io import WRITERS
 from edgel.view import texts
 from edgel.view.session import LEAST_STRENGTH, Pane
-from edgel.view.settings import ALL_KINDS, MAX_SCALE, METHODS, Coloring, Settings
+from edgel.view.settings import MAX_SCALE, METHODS, Coloring, Settings
 from edgel.view.source import Source
 
 _EDGE_COLORS = ("kind", "strength")
@@ -48,7 +48,7 @@ class Controls:
                 "Scale", 1.0, MAX_SCALE, 0.5, start.scale, hint="Find only what is larger than this many point spacings"
             )
         with gui.add_folder("Show kinds"):
-            self.kinds = {kind: gui.add_checkbox(kind_names(kind)[0], kind in start.kinds) for kind in ALL_KINDS}
+            self.kinds = {kind: gui.add_checkbox(kind_names(kind)[0], kind in start.kinds) for kind in ASKABLE}
         with gui.add_folder("Look"):
             self.coloring: Any = gui.add_dropdown("Color cloud by", (Coloring.GREY.value,))
             self.edge_colors = gui.add_dropdown("Color edges by", _EDGE_COLORS)

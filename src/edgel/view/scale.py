@@ -10,7 +10,7 @@ import numpy as np
 
 import edgel
 from edgel.cloud import as_cloud, check_points
-from edgel.detect import DEFAULT_KINDS
+from edgel.detect import DEFAULT_KINDS, LIKELY
 from edgel.edges import EdgeKind, Edges
 from edgel.kdtree import build_index
 from edgel.neighbors import knn
@@ -84,7 +84,7 @@ def detect_at_scale(
     *,
     preset: Literal["default", "paper"] = "default",
     kinds: EdgeKind | str | Iterable[str] = DEFAULT_KINDS,
-    min_strength: float = 0.5,
+    min_strength: float = LIKELY,
     progress: Callable[[str], None] | None = None,
 ) -> Edges:
     """Find edges larger than some spacings: `edgel.detect` on the cloud thinned to one point a voxel of that size.

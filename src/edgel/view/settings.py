@@ -7,14 +7,12 @@ from enum import Enum
 
 import numpy as np
 
+from edgel.detect import DEFAULT_KINDS, LIKELY, PRESETS
 from edgel.edges import EdgeKind
 
-PRESETS = ("default", "paper")
 METHODS = {"edgel": ("default",), "paper": ("paper",), "side by side": PRESETS}
 """Presets shown by each choice of the page."""
 
-ALL_KINDS = EdgeKind.BOUNDARY | EdgeKind.OCCLUDING | EdgeKind.OCCLUDED | EdgeKind.CREASE | EdgeKind.COLOR
-STRENGTH = 0.5  # what the default detector decides by
 MAX_SCALE = 10.0
 
 
@@ -79,9 +77,9 @@ class Settings:
 
     method: str = "edgel"
     scale: float = 1.0
-    strength: float = STRENGTH
+    strength: float = LIKELY
     angle: float = 0.0
-    kinds: EdgeKind = ALL_KINDS & ~EdgeKind.COLOR
+    kinds: EdgeKind = DEFAULT_KINDS
     crop: tuple[tuple[float, float], ...] = ((0.0, 1.0),) * 3
     coloring: Coloring = Coloring.GREY
     by_strength: bool = False
