@@ -12,8 +12,7 @@ from rivals import RIVALS
 import edgel
 from edgel import metrics
 from edgel.edges import EdgeKind
-from edgel.kdtree import build_index
-from edgel.neighbors import knn
+from edgel.view.scale import median_spacing
 
 FAMILIES = ("abc", "abc_noise_0.04", "shrec", "default")
 METHODS = ("edgel default", "edgel paper", "surface variation")
@@ -39,7 +38,7 @@ def measured(data: Path) -> list[dict[str, Any]]:
         family, model = file.stem.rsplit("_", 1)
         truth = cloud.attributes["edge"]
         for rival in rivals:
-            found = rival.run(cloud, _spacing(cloud.xyz), rival.defaults)
+            found = rival.run(cloud, median_spacing(cloud), rival.defaults)
             mask = found.mask
             if rival.name == "edgel default":  # these models are closed: a boundary is no crease
                 mask = mask & ((found.kind & int(EdgeKind.CREASE)) > 0)
@@ -57,9 +56,3 @@ def means(rows: list[dict[str, Any]]) -> dict[tuple[str, str], float]:
         (family, method): float(np.mean([r["f1"] for r in rows if r["family"] == family and r["method"] == method]))
         for family, method in {(r["family"], r["method"]) for r in rows}
     }
-
-
-def _spacing(points: np.ndarray) -> float:
-    """Median distance to the nearest other point."""
-    found = knn(build_index(points), points, 2).distances[:, 1]
-    return float(np.median(found[found > 0]))

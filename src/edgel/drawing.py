@@ -8,7 +8,7 @@ import numpy as np
 from PIL import Image
 
 from edgel.cloud import as_cloud
-from edgel.edges import EdgeKind, Edges
+from edgel.edges import Edges, kind_names
 from edgel.legend import Entry, Strip
 from edgel.palette import KIND_COLORS, kind_colors, ramp_colors
 from edgel.scene import FINE, Scene
@@ -91,15 +91,15 @@ def _edge_colors(edges: Edges | None, edge_color: str) -> tuple[np.ndarray, list
         return np.empty((0, 3), np.uint8), []
     if edge_color == "kind":
         counts = edges.count_kinds()
-        used = [kind for kind in KIND_COLORS if str(kind.name).lower() in counts]
-        entries = [_kind_entry(kind, counts[str(kind.name).lower()]) for kind in used]
+        names = {kind_names(kind)[0]: color for kind, color in KIND_COLORS.items()}
+        entries = [
+            Entry(np.array([color], np.uint8), f"{name} {counts[name]:,}")
+            for name, color in names.items()
+            if name in counts
+        ]
         return kind_colors(edges.kind), entries
     low, high = (edges.strength.min(), edges.strength.max()) if len(edges) else (0.0, 1.0)
     share = (edges.strength - low) / (high - low) if high > low else np.ones(len(edges))
     # Surfaces are light: what is strong shall be dark.
     ramp = ramp_colors(np.linspace(1, 0, 32))
     return ramp_colors(1.0 - share), [Entry(ramp, f"{high:.2f}", f"strength {low:.2f}")]
-
-
-def _kind_entry(kind: EdgeKind, count: int) -> Entry:
-    return Entry(np.array([KIND_COLORS[kind]], np.uint8), f"{str(kind.name).lower()} {count:,}")

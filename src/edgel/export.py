@@ -17,7 +17,7 @@ import numpy as np
 from PIL import Image
 
 from edgel.cloud import Cloud, check_points
-from edgel.edges import EdgeKind, Edges
+from edgel.edges import EdgeKind, Edges, kind_names
 from edgel.palette import KIND_COLORS, as_hex, kind_colors
 from edgel.plot import picture
 
@@ -59,7 +59,7 @@ def draw(edges: Edges, axes: Any, points: Any) -> Any:
     for kind, color in KIND_COLORS.items():
         at = edges.position[first == kind]
         if len(at):
-            axes.scatter(*at.T[:count], s=3, color=as_hex(color), linewidths=0, label=str(kind.name).lower())
+            axes.scatter(*at.T[:count], s=3, color=as_hex(color), linewidths=0, label=kind_names(kind)[0])
     axes.set_aspect("equal")
     for name in "xyz"[:count]:
         axes.set(**{f"{name}label": name})
