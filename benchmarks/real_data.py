@@ -31,7 +31,7 @@ REMARKS = {
     "the folds. The paper finds the outlines only.",
     "lidar_sweeps": "The default knows the spinning sensor by its 32 rings and sees the sweep as it did: near and far sides "
     "of depth steps, and the end of the ground about the car. Creases between rings are mostly false: a "
-    "ring's neighbours lie on the ring. It takes 15 s, since thousands of shots without an echo lie at one "
+    "ring's neighbours lie on the ring. It takes 12 s, since thousands of shots without an echo lie at one "
     "place, the origin. For the paper every pixel beside a ring is an edge.",
     "roofs": "About a thousand points a roof. The default finds most of the eaves and parts of the ridges, with gaps. "
     "The paper's image is 8 pixels wide.",
