@@ -1,6 +1,6 @@
 """Train the trees of `edgel.evidence` on random scenes of `edgel.synth`, and write their weights into the package.
 
-Run: python benchmarks/train.py [--scenes 2000] (20 minutes on two cores; evidence is kept in benchmarks/cache/training).
+Run: python benchmarks/train.py [--scenes 2000] (15 minutes on two cores; evidence is kept in benchmarks/cache/training).
 Needs `pip install edgel[train]`. Nothing of the benchmark and no real data is seen in training: see `training.example`.
 
 Glances, at leaves of the index and at each point's nearest, say where to look closer; the rest learns from what they let
