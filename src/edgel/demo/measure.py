@@ -25,9 +25,10 @@ class Times:
     Attributes
     ----------
     all_normals, edge_normals : float
-        Normals at all points and at the edge points, each with the building of the neighbour index.
+        Normals at all points and at the edge points, each with the building of the neighbour index: of all points, and
+        of those near edges alone.
     index : float
-        The index alone, which both need.
+        The index of all points alone.
     all_fits, edge_fits : float
         The neighbour search and plane fits alone.
     image : float
