@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial import KDTree
 
-from edgel.kdtree import bounds, build_index, node_start
+from edgel.kdtree import BUCKET, bounds, build_index, node_start
 from edgel.neighbors import knn
 
 # Few different coordinates, so that ties and duplicates are the rule.
@@ -74,6 +74,23 @@ def test_order_of_the_input_changes_nothing(points, random):
     np.testing.assert_array_equal(points[a.rows], points[shuffled][b.rows])
 
 
+@given(st.integers(0, 2**32 - 1), st.integers(1, 40))
+def test_many_points_at_few_places(seed, k):
+    rng = np.random.default_rng(seed)
+    points = rng.permutation(np.r_[np.zeros((300, 3)), np.ones((200, 3)), rng.integers(0, 4, (40, 3)) / 2.0])
+    queries = np.r_[np.zeros((1, 3)), np.ones((1, 3)), rng.normal(size=(6, 3))]
+    found = knn(build_index(points), queries, k)
+    for rows, query in zip(found.rows, queries, strict=True):
+        assert rows.tolist() == naive.nearest(points.tolist(), query.tolist(), k)
+
+
+def test_what_a_sensor_did_not_see_at_the_origin_costs_no_more_than_the_rest():
+    points = np.r_[np.zeros((200_000, 3)), cloud("surface", 2000) + 1]
+    found = knn(build_index(points), points[::997], 16)
+    np.testing.assert_array_equal(found.rows[0], np.arange(16))
+    assert (found.distances[0] == 0).all()
+
+
 def test_queries_need_not_be_points_of_the_cloud():
     points = cloud("surface")
     queries = np.random.default_rng(1).normal(0, 20, (500, 3))
@@ -110,6 +127,12 @@ def test_index_holds_every_point_once_and_its_boxes_hold_the_points(n):
     leaves = len(index.boxes) // 2
     for leaf in np.random.default_rng(0).integers(0, leaves, 20):
         inside = index.xyz[:, node_start(leaf, n, leaves) : node_start(leaf + 1, n, leaves)]
-        assert 0 < inside.shape[1] <= 16
+        assert 0 < inside.shape[1] <= BUCKET
         np.testing.assert_array_equal(index.boxes[leaves + leaf], np.r_[inside.min(axis=1), inside.max(axis=1)])
     np.testing.assert_array_equal(index.boxes[1], np.r_[lower, upper])
+
+
+@pytest.mark.parametrize("k", [0, 4])
+def test_more_neighbours_than_points_are_refused(k):
+    with pytest.raises(ValueError, match="num_neighbors: expected 1 to 3"):
+        knn(build_index(np.eye(3)), np.eye(3), k)

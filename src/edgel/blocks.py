@@ -67,6 +67,8 @@ class Room(NamedTuple):
         x, y, z of the eight queries.
     limits : (8,) float64
         Squared distance up to which points are among the k nearest of each.
+    ends : (8,) float64
+        Squared distance up to which at least k points lie.
     """
 
     near: np.ndarray
@@ -75,6 +77,7 @@ class Room(NamedTuple):
     squared: np.ndarray
     queries: np.ndarray
     limits: np.ndarray
+    ends: np.ndarray
 
 
 @kernel
@@ -94,7 +97,15 @@ def aligned(size):
 @kernel
 def _with_room_for(found, near, near_boxes):
     squared = aligned(LANES * LANES * found)
-    return Room(near, near_boxes, np.empty(found, np.int64), squared, np.empty(3 * LANES), np.full(LANES, np.inf))
+    return Room(
+        near,
+        near_boxes,
+        np.empty(found, np.int64),
+        squared,
+        np.empty(3 * LANES),
+        np.full(LANES, np.inf),
+        np.empty(LANES),
+    )
 
 
 @kernel
@@ -112,17 +123,32 @@ def _box_distance(boxes, node, low_x, low_y, low_z, high_x, high_y, high_z):
     return dx * dx + dy * dy + dz * dz
 
 
+@part
+def _same_place(boxes, node, other):
+    """Whether two nodes begin at the same place."""
+    return boxes[node, 0] == boxes[other, 0] and boxes[node, 1] == boxes[other, 1] and boxes[node, 2] == boxes[other, 2]
+
+
 @kernel
-def walk(tree, low_x, low_y, low_z, high_x, high_y, high_z, reach, found):
-    """List the blocks of the leaves within a squared reach of a box, ascending; -1 if they are too many."""
+def walk(tree, low_x, low_y, low_z, high_x, high_y, high_z, reach, k, found):
+    """List the blocks of the leaves within a squared reach of a box, ascending; -1 if they are too many.
+
+    Of leaves that lie at one place only the first with k points are listed: sensors put all that they do not see at the
+    origin, and no query needs more of them.
+    """
     boxes, num_points = tree.boxes, len(tree.order)
     leaves, count, depth = boxes.shape[0] // 2, 0, 1
     stack = np.empty(64, np.int64)
-    stack[0] = 1
+    stack[0], spot, at_spot = 1, 0, 0
     while depth > 0:
         depth -= 1
         node = stack[depth]
         if _box_distance(boxes, node, low_x, low_y, low_z, high_x, high_y, high_z) > reach:
+            continue
+        one_place = (
+            boxes[node, 0] == boxes[node, 3] and boxes[node, 1] == boxes[node, 4] and boxes[node, 2] == boxes[node, 5]
+        )
+        if one_place and at_spot >= k and _same_place(boxes, node, spot):
             continue
         if node < leaves:
             stack[depth], stack[depth + 1] = 2 * node + 1, 2 * node
@@ -130,6 +156,9 @@ def walk(tree, low_x, low_y, low_z, high_x, high_y, high_z, reach, found):
             continue
         first = node_start(node - leaves, num_points, leaves)
         last = node_start(node - leaves + 1, num_points, leaves)
+        if one_place:
+            at_spot = last - first + (at_spot if _same_place(boxes, node, spot) else 0)
+            spot = node
         for block in range(first // LANES, (last + LANES - 1) // LANES):
             if count == len(found):
                 return -1
@@ -139,41 +168,59 @@ def walk(tree, low_x, low_y, low_z, high_x, high_y, high_z, reach, found):
 
 
 @kernel
-def sure_reach(tree, low_x, low_y, low_z, high_x, high_y, high_z, k):
-    """Squared distance within which a box has k points for sure: all of some node that lies near it."""
-    boxes, num_points = tree.boxes, len(tree.order)
-    leaves, node, nodes = boxes.shape[0] // 2, 1, 1
-    while node < leaves:
-        near = _box_distance(boxes, 2 * node, low_x, low_y, low_z, high_x, high_y, high_z)
-        far = _box_distance(boxes, 2 * node + 1, low_x, low_y, low_z, high_x, high_y, high_z)
-        child, nodes = 2 * node + (far < near), 2 * nodes
-        place = child - nodes
-        if node_start(place + 1, num_points, nodes) - node_start(place, num_points, nodes) < k:
-            break
-        node = child
-    dx = max(boxes[node, 3] - low_x, high_x - boxes[node, 0])
-    dy = max(boxes[node, 4] - low_y, high_y - boxes[node, 1])
-    dz = max(boxes[node, 5] - low_z, high_z - boxes[node, 2])
-    return dx * dx + dy * dy + dz * dz
+def kth_distance(tree, qx, qy, qz, k):
+    """Squared distance of the k-th nearest point of one query: each time the nearer child of a node first."""
+    x, y, z, boxes, num_points = tree.x, tree.y, tree.z, tree.boxes, len(tree.order)
+    leaves, depth, best = boxes.shape[0] // 2, 1, np.full(k, np.inf)
+    stack, reaches = np.empty(64, np.int64), np.empty(64)
+    stack[0], reaches[0] = 1, 0.0
+    while depth > 0:
+        depth -= 1
+        node = stack[depth]
+        if reaches[depth] >= best[k - 1]:
+            continue
+        if node < leaves:
+            near, far = 2 * node, 2 * node + 1
+            near_d = _box_distance(boxes, near, qx, qy, qz, qx, qy, qz)
+            far_d = _box_distance(boxes, far, qx, qy, qz, qx, qy, qz)
+            if far_d < near_d:
+                near, far, near_d, far_d = far, near, far_d, near_d
+            stack[depth], reaches[depth] = far, far_d
+            stack[depth + 1], reaches[depth + 1] = near, near_d
+            depth += 2
+            continue
+        for p in range(
+            node_start(node - leaves, num_points, leaves), node_start(node - leaves + 1, num_points, leaves)
+        ):
+            dx, dy, dz = x[p] - qx, y[p] - qy, z[p] - qz
+            d, slot = dx * dx + dy * dy + dz * dz, k - 1
+            if d >= best[slot]:
+                continue
+            while slot > 0 and d < best[slot - 1]:
+                best[slot] = best[slot - 1]
+                slot -= 1
+            best[slot] = d
+    return best[k - 1]
 
 
 @kernel
-def _look_round(tree, queries, first, last, reach, room):
+def _look_round(tree, queries, first, last, reach, k, room):
     """Gather the blocks near the queries first..last-1; returns how many, filled up to eights, or -1."""
     low_x, low_y, low_z = np.inf, np.inf, np.inf
     high_x, high_y, high_z = -np.inf, -np.inf, -np.inf
+    x, y, z = queries.x, queries.y, queries.z
     for q in range(first, last):
-        low_x, high_x = min(low_x, queries.x[q]), max(high_x, queries.x[q])
-        low_y, high_y = min(low_y, queries.y[q]), max(high_y, queries.y[q])
-        low_z, high_z = min(low_z, queries.z[q]), max(high_z, queries.z[q])
-    near, boxes = room.near, room.near_boxes
-    count = walk(tree, low_x, low_y, low_z, high_x, high_y, high_z, reach, near[: len(near) - LANES])
+        low_x, high_x = min(low_x, x[q]), max(high_x, x[q])
+        low_y, high_y = min(low_y, y[q]), max(high_y, y[q])
+        low_z, high_z = min(low_z, z[q]), max(high_z, z[q])
+    near, boxes, blocks = room.near, room.near_boxes, tree.blocks
+    count = walk(tree, low_x, low_y, low_z, high_x, high_y, high_z, reach, k, near[: len(near) - LANES])
     if count < 0:
         return -1
     size = len(near)
     for i in range(count):
         for side in range(6):
-            boxes[side * size + i] = tree.blocks[side, near[i]]
+            boxes[side * size + i] = blocks[side, near[i]]
     whole = (count + LANES - 1) // LANES * LANES
     for i in range(count, whole):  # nowhere
         near[i] = 0
@@ -185,7 +232,7 @@ def _look_round(tree, queries, first, last, reach, room):
 @part
 def pick(room, near, low_x, low_y, low_z, high_x, high_y, high_z, reach):
     """List those blocks near a chunk that are near a box in it, ascending; -1 if they are too many."""
-    boxes, found, size, count = room.near_boxes, room.found, len(room.near), 0
+    boxes, blocks, found, size, count = room.near_boxes, room.near, room.found, len(room.near), 0
     for i in range(0, near, LANES):
         dx = larger(larger(load(boxes, i) - high_x, low_x - load(boxes, 3 * size + i)), spread(0.0))
         dy = larger(larger(load(boxes, size + i) - high_y, low_y - load(boxes, 4 * size + i)), spread(0.0))
@@ -194,13 +241,13 @@ def pick(room, near, low_x, low_y, low_z, high_x, high_y, high_z, reach):
         if count + LANES > len(found):
             return -1
         for lane in range(LANES):
-            found[count] = room.near[i + lane]  # written in any case: no branch to guess
+            found[count] = blocks[i + lane]  # written in any case: no branch to guess
             count += (inside >> lane) & 1
     return count
 
 
 @kernel
-def look_round(tree, queries, first, last, reach, room):
+def look_round(tree, queries, first, last, reach, k, room):
     """Gather the blocks near the queries first..last-1, which lie together, for `nearest_of_eight`.
 
     Returns
@@ -211,5 +258,5 @@ def look_round(tree, queries, first, last, reach, room):
     if not reach < np.inf:
         return 0, -1.0
     reach *= SLACK
-    near = _look_round(tree, queries, first, last, reach, room)
+    near = _look_round(tree, queries, first, last, reach, k, room)
     return (near, reach) if near >= 0 else (0, -1.0)

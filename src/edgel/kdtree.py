@@ -1,7 +1,8 @@
 """A balanced k-d tree laid out in place: the order of points in which neighbour queries are fast.
 
 Halving the widest axis at the median follows any density (a scan, a LiDAR sweep) and needs no cell size. Ties at a
-median go by the other axes, and leaves are sorted: the layout depends on the points alone, not on their order.
+median go by the other axes, then by the row, and leaves are sorted: where points lie depends on the points alone, not
+on their order, and those at one place follow one another by their rows.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from edgel.lanes import LANES, larger, largest_of, load, smaller, smallest_of, s
 from edgel.parallel import kernel, run_slices
 from edgel.ranks import sort_leaf, sort_places, value_at
 
-BUCKET = 16  # most points a leaf holds
+BUCKET = 32  # most points a leaf holds
 _SHARED_LEVELS = 5  # levels split one after the other; below them each subtree fits a core's own cache
 
 
@@ -65,7 +66,7 @@ def build_index(xyz: np.ndarray) -> NeighborIndex:
     >>> import numpy as np
     >>> index = build_index(np.random.default_rng(0).random((1000, 3)))
     >>> len(index), index.boxes.shape
-    (1000, (128, 6))
+    (1000, (64, 6))
     """
     count = len(xyz)
     depth = max(-(-count // BUCKET) - 1, 0).bit_length()
@@ -176,7 +177,7 @@ def _split_node(place, level, xyz, order, to_xyz, to_order, room, box):
         to_key[to], to_second[to], to_third[to], to_order[to] = key[p], second[p], third[p], order[p]
         left += below
         right -= not below
-    if left < middle and box[axis] < box[3 + axis]:  # some that equal the median belong to the left
+    if left < middle:  # some that equal the median belong to the left
         tied = left
         for p in range(left, last):
             if to_key[p] == pivot:

@@ -77,7 +77,14 @@ def visit_neighbors(
     index : NeighborIndex
     num_neighbors : int
         k.
+
+    Raises
+    ------
+    ValueError
+        If the index has fewer points.
     """
+    if not 1 <= num_neighbors <= len(index):
+        raise ValueError(f"num_neighbors: expected 1 to {len(index)}, the number of points, got {num_neighbors}")
     asked, tree = queries_of(queries), tree_of(index)
 
     def work(start: int, stop: int) -> None:
@@ -97,7 +104,7 @@ def _list(start, stop, queries, tree, places, squared):
     distances, ranks, points = aligned(length + 1), aligned(length), np.empty(length + 1, np.int64)
     for first in range(start, stop, CHUNK):
         last = min(first + CHUNK, stop)
-        near, near_reach = look_round(tree, queries, first, last, reach, room)
+        near, near_reach = look_round(tree, queries, first, last, reach, k, room)
         begin = first
         while begin < last:
             size, count, reach = nearest_of_eight(tree, queries, first, last, begin, near, near_reach, reach, k, room)
@@ -113,11 +120,11 @@ def _list(start, stop, queries, tree, places, squared):
 @part
 def _take(room, count, lane, points, distances):
     """Copy the places and squared distances of a lane's k nearest, in the order of the tree."""
-    limit, kept = room.limits[lane], 0
+    found, squared, limit, kept = room.found, room.squared, room.limits[lane], 0
     for i in range(count):
-        first = LANES * room.found[i]
+        first = LANES * found[i]
         for j in range(LANES):
-            d = room.squared[(i * LANES + j) * LANES + lane]
+            d = squared[(i * LANES + j) * LANES + lane]
             points[kept], distances[kept] = first + j, d  # written in any case: no branch to guess
             kept += d <= limit
 
@@ -137,10 +144,11 @@ def _rank(tree, points, distances, ranks, places, squared):
         store(ranks, i, as_floats(nearer))
         tied |= bits((equal > 1) & (d < np.inf)) != 0
     if tied:
+        x, y, z, order = tree.x, tree.y, tree.z, tree.order
         for i in range(k):
             slot, d, point = i, distances[i], points[i]
             while slot > 0 and (
-                d < squared[slot - 1] or (d == squared[slot - 1] and first_of(tree, point, places[slot - 1]))
+                d < squared[slot - 1] or (d == squared[slot - 1] and first_of(x, y, z, order, point, places[slot - 1]))
             ):
                 squared[slot], places[slot] = squared[slot - 1], places[slot - 1]
                 slot -= 1

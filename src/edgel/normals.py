@@ -133,8 +133,11 @@ def plane_fits(index: NeighborIndex, xyz: np.ndarray, num_neighbors: int) -> Nor
 
 
 def fit_planes(index: NeighborIndex, queries: NeighborIndex, num_neighbors: int) -> Normals:
-    """Fit planes at sorted queries, which may be the index itself; normals upwards, rows in the queries' own order."""
-    return _fit(tree_of(index), queries_of(queries), num_neighbors, np.empty(0))
+    """Fit planes at sorted queries, which may be the index itself; normals upwards, rows in the queries' own order.
+
+    All points are neighbours where there are fewer than `num_neighbors`.
+    """
+    return _fit(tree_of(index), queries_of(queries), min(num_neighbors, len(index)), np.empty(0))
 
 
 def plane_fits_within(

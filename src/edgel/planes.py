@@ -30,10 +30,10 @@ def fit_slice(start, stop, queries, tree, k, normals, offset, residual, variatio
 
     `limits` (M,) takes the squared distance within which the k nearest lie; it may be empty.
     """
-    room, planes, reach = make_room(), np.empty(6 * LANES), np.inf
+    room, planes, reach, rows = make_room(), np.empty(6 * LANES), np.inf, queries.rows
     for first in range(start, stop, CHUNK):
         last = min(first + CHUNK, stop)
-        near, near_reach = look_round(tree, queries, first, last, reach, room)
+        near, near_reach = look_round(tree, queries, first, last, reach, k, room)
         begin = first
         while begin < last:
             size, count, reach = nearest_of_eight(tree, queries, first, last, begin, near, near_reach, reach, k, room)
@@ -41,7 +41,7 @@ def fit_slice(start, stop, queries, tree, k, normals, offset, residual, variatio
                 room = larger_room(room)
             _fit_eight(tree, room, count, k, planes)
             for lane in range(size):
-                row = queries.rows[begin + lane]
+                row = rows[begin + lane]
                 for axis in range(3):
                     normals[row, axis] = planes[axis * LANES + lane]
                 offset[row] = planes[3 * LANES + lane]

@@ -81,7 +81,7 @@ def value_at(rank, keys, first, count, room):
 
 @kernel
 def sort_places(key, second, third, order, first, last):
-    """Sort places first..last-1 of four arrays by the first three (Shell 1959)."""
+    """Sort places first..last-1 by four arrays, the first before the second and so on (Shell 1959)."""
     gap = 1
     while 3 * gap + 1 < last - first:
         gap = 3 * gap + 1
@@ -90,7 +90,13 @@ def sort_places(key, second, third, order, first, last):
             a, b, c, row, to = key[p], second[p], third[p], order[p], p
             while to - gap >= first:
                 q = to - gap
-                if key[q] < a or (key[q] == a and (second[q] < b or (second[q] == b and third[q] <= c))):
+                if key[q] != a:
+                    if key[q] < a:
+                        break
+                elif second[q] != b:
+                    if second[q] < b:
+                        break
+                elif third[q] < c or (third[q] == c and order[q] <= row):
                     break
                 key[to], second[to], third[to], order[to] = key[q], second[q], third[q], order[q]
                 to = q

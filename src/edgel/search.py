@@ -8,9 +8,11 @@ it has the group searched again, farther.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from edgel.blocks import SLACK, pick, sure_reach, walk
+from edgel.blocks import SLACK, kth_distance, pick, walk
 from edgel.lanes import (
     LANES,
     as_floats,
@@ -30,7 +32,7 @@ from edgel.lanes import (
 from edgel.parallel import kernel, part
 
 _LESS = 1.0 - 2.0**-52  # of a number, the next smaller or the one after it
-_ROUNDS = 20  # after so many counts a lane's k-th and next distance are taken to be equal
+_ROUNDS = 20  # counts after which the points between too few and too many are sorted instead
 
 
 @part
@@ -62,8 +64,9 @@ def _divide(room, count, k, reach, within):
     without. The first try are the limits of the group before.
     """
     squared, points = room.squared, count * LANES * LANES
-    low, high, fewer, more = spread(-1.0), spread(reach), counts_of(0), within
-    limit, none, beyond = smaller(load(room.limits, 0), high), spread(-1.0), spread(np.inf)
+    none, beyond = spread(-1.0), spread(np.inf)
+    low, above, high, fewer, more = none, none, spread(reach), counts_of(0), within
+    limit = smaller(load(room.limits, 0), high)
     for step in range(_ROUNDS):
         # Two points at a time, each with its own results: the next need not wait for the one before.
         inside, under, over = counts_of(0), none, beyond
@@ -76,81 +79,93 @@ def _divide(room, count, k, reach, within):
             over, over_2 = smaller(over, where(nearer, beyond, d)), smaller(over_2, where(nearer_2, beyond, d_2))
         inside, under, over = inside + inside_2, larger(under, under_2), smaller(over, over_2)
         low, fewer = where(inside < k, limit, low), where_counts(inside < k, inside, fewer)
-        high, more = where(inside >= k, limit, high), where_counts(inside >= k, inside, more)
+        above = where(inside < k, over, above)
+        high, more = where(inside >= k, under, high), where_counts(inside >= k, inside, more)
         one_less, one_more = inside == k - 1, inside == k + 1
         share = (k + 0.5 - as_floats(fewer)) / (as_floats(more) - as_floats(fewer))
         share = share if step % 3 < 2 else spread(0.5)
         limit = where(inside == k, limit, low + (high - low) * share)
         limit = where(one_less, over, where(one_more, under * _LESS, limit))
-        if bits(one_less | one_more | (inside == k)) == 255:
+        if bits(one_less | one_more | (inside == k) | (above == high)) == 255:  # the last: nothing but ties between
             break
     inside = counts_of(0)
     for i in range(0, points, LANES):
         inside = counted(inside, load(squared, i) <= limit)
-    store(room.limits, 0, where(inside == k, limit, low))
+    store(room.limits, 0, where(inside <= k, limit, low))
+    store(room.ends, 0, where(inside >= k, limit, high))
     return bits(inside == k)
 
 
-@kernel
-def first_of(tree, a, b):
+@part
+def first_of(x, y, z, order, a, b):
     """Whether sorted point a comes before b by x, y, z; duplicates by their row in the input."""
-    if tree.x[a] != tree.x[b]:
-        return tree.x[a] < tree.x[b]
-    if tree.y[a] != tree.y[b]:
-        return tree.y[a] < tree.y[b]
-    if tree.z[a] != tree.z[b]:
-        return tree.z[a] < tree.z[b]
-    return tree.order[a] < tree.order[b]
+    if x[a] != x[b]:
+        return x[a] < x[b]
+    if y[a] != y[b]:
+        return y[a] < y[b]
+    if z[a] != z[b]:
+        return z[a] < z[b]
+    return order[a] < order[b]
 
 
 @part
-def place_of(room, i):
-    """Sorted place of the i-th point of the blocks found."""
-    return LANES * room.found[i // LANES] + i % LANES
+def _before(x, y, z, order, found, squared, lane, i, j):
+    """Whether the i-th point of the blocks found comes before the j-th: by distance, then by coordinates."""
+    a, b = squared[i * LANES + lane], squared[j * LANES + lane]
+    if a != b:
+        return a < b
+    return first_of(x, y, z, order, LANES * found[i // LANES] + i % LANES, LANES * found[j // LANES] + j % LANES)
 
 
 @kernel
 def _settle(tree, room, count, k, lane):
     """Where the k-th distance equals the next one, leave only the points of smallest coordinates within the limit."""
-    squared, low, missing = room.squared, room.limits[lane], k
+    # Taken out of their tuples once: each time costs two atomic operations, for the count of references.
+    x, y, z, order, found, squared = tree.x, tree.y, tree.z, tree.order, room.found, room.squared
+    low, high, missing = room.limits[lane], room.ends[lane], k
     for i in range(count * LANES):
         missing -= squared[i * LANES + lane] <= low
-    last, limit = -1, low
-    for _ in range(missing):
-        best, least = -1, np.inf
-        for i in range(count * LANES):
-            d = squared[i * LANES + lane]
-            if d <= low or d > least or d < limit:
-                continue
-            if d == limit and last >= 0 and not first_of(tree, place_of(room, last), place_of(room, i)):
-                continue
-            if d < least or best < 0 or first_of(tree, place_of(room, i), place_of(room, best)):
-                best, least = i, d
-        last, limit = best, least
+    nearest, kept = np.empty(missing, np.int64), 0
     for i in range(count * LANES):
-        if (
-            squared[i * LANES + lane] == limit
-            and i != last
-            and not first_of(tree, place_of(room, i), place_of(room, last))
-        ):
+        d = squared[i * LANES + lane]
+        if d <= low or d > high:
+            continue
+        slot = kept
+        while slot > 0 and _before(x, y, z, order, found, squared, lane, i, nearest[slot - 1]):
+            if slot < missing:
+                nearest[slot] = nearest[slot - 1]
+            slot -= 1
+        if slot < missing:
+            nearest[slot] = i
+            kept = min(kept + 1, missing)
+    last = nearest[missing - 1]
+    limit = squared[last * LANES + lane]
+    for i in range(count * LANES):
+        if squared[i * LANES + lane] == limit and i != last and _before(x, y, z, order, found, squared, lane, last, i):
             squared[i * LANES + lane] = np.inf
     room.limits[lane] = limit
 
 
 @part
-def _search(tree, room, near, near_reach, reach, k):
-    """Find the k nearest of the queries in `room`: see `nearest_of_eight`."""
+def _search(tree, room, size, near, near_reach, reach, k):
+    """Find the k nearest of the first `size` queries in `room`: see `nearest_of_eight`."""
     qx, qy, qz = load(room.queries, 0), load(room.queries, LANES), load(room.queries, 2 * LANES)
     low_x, low_y, low_z = smallest_of(qx), smallest_of(qy), smallest_of(qz)
     high_x, high_y, high_z = largest_of(qx), largest_of(qy), largest_of(qz)
+    dx, dy, dz = high_x - low_x, high_y - low_y, high_z - low_z
+    diagonal = dx * dx + dy * dy + dz * dz
+    if size == LANES and diagonal > 0.0:
+        # Where the points suddenly lie closer than those before, the size of the group itself says so.
+        reach = min(reach, diagonal * k / LANES)
     count, within = 0, counts_of(0)
     for attempt in range(3):
-        if attempt == 2 or not reach < np.inf:
-            reach = sure_reach(tree, low_x, low_y, low_z, high_x, high_y, high_z, k)
+        if attempt == 2 or not reach < np.inf:  # no more guesses: what one needs, and how far the others lie from it
+            sure = math.sqrt(kth_distance(tree, room.queries[0], room.queries[LANES], room.queries[2 * LANES], k))
+            reach = (sure + math.sqrt(diagonal)) ** 2 * (1.0 + 1e-12)
         if reach <= near_reach:
             count = pick(room, near, low_x, low_y, low_z, high_x, high_y, high_z, reach)
         else:
-            count = walk(tree, low_x, low_y, low_z, high_x, high_y, high_z, reach, room.found)
+            count = walk(tree, low_x, low_y, low_z, high_x, high_y, high_z, reach, k, room.found)
         if count < 0:
             return -1, reach
         within = _measure(tree, room, count, reach)
@@ -158,7 +173,7 @@ def _search(tree, room, near, near_reach, reach, k):
             break
         reach *= 2.0
     settled = _divide(room, count, k, reach, within)
-    for lane in range(LANES):
+    for lane in range(size):
         if not (settled >> lane) & 1:
             _settle(tree, room, count, k, lane)
     return count, SLACK * largest_of(load(room.limits, 0))
@@ -196,10 +211,10 @@ def nearest_of_eight(tree, queries, first, last, begin, near, near_reach, reach,
         else:
             for lane in range(LANES):
                 _ask(queries, begin + min(lane, size - 1), room, lane)
-        count, farther = _search(tree, room, near, near_reach, reach, k)
+        count, farther = _search(tree, room, size, near, near_reach, reach, k)
         if count >= 0:
             return size, count, farther
     for lane in range(LANES):
         _ask(queries, begin, room, lane)
-    count, farther = _search(tree, room, near, -1.0, reach, k)
+    count, farther = _search(tree, room, 1, near, -1.0, np.inf, k)
     return (1, count, farther) if count >= 0 else (0, 0, reach)
