@@ -136,7 +136,6 @@ def survey(index: NeighborIndex, trees: Mapping[str, Forest] | None = None) -> S
     normals = np.repeat(planes[:, None].astype(np.float32), len(SCALES), axis=1).repeat(size, axis=0)
     likely = np.zeros(len(index), np.float32)
     places = np.flatnonzero(rough)
-    forest = trees["screen"]
     if len(places):
         visit_neighbors(
             gather.survey,
@@ -146,10 +145,7 @@ def survey(index: NeighborIndex, trees: Mapping[str, Forest] | None = None) -> S
             places,
             np.array(SCALES),
             cloud,
-            forest.roots,
-            forest.feature,
-            forest.threshold,
-            forest.right,
+            trees["screen"].in_step,
             normals,
             likely,
         )

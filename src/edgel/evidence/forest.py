@@ -4,11 +4,35 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import IO
+from functools import cached_property
+from typing import IO, NamedTuple
 
 import numpy as np
 
+from edgel.lanes import LANES
 from edgel.parallel import kernel, run_slices
+
+IN_STEP = 16  # rows that meet a tree while it is near: a multiple of eight
+
+
+class Trees(NamedTuple):
+    """A `Forest` for eight rows in step.
+
+    Attributes
+    ----------
+    roots : (T,) uint32
+    feature : (M,) uint16
+    threshold : (M,) float32
+        The value of a leaf.
+    child : (2 M,) uint32
+        Where a row goes on from node i: at 2 i, or at 2 i + 1 where its feature is above the threshold. A leaf is its
+        own child: who has come to one stays.
+    """
+
+    roots: np.ndarray
+    feature: np.ndarray
+    threshold: np.ndarray
+    child: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +56,18 @@ class Forest:
     threshold: np.ndarray
     right: np.ndarray
 
+    @cached_property
+    def in_step(self) -> Trees:
+        """The trees for `add_up`."""
+        leaf, node = self.feature < 0, np.arange(len(self.feature))
+        child = np.column_stack([np.where(leaf, node, node + 1), np.where(leaf, node, self.right)])
+        return Trees(
+            self.roots.astype(np.uint32),
+            np.where(leaf, 0, self.feature).astype(np.uint16),
+            self.threshold,
+            child.astype(np.uint32).ravel(),
+        )
+
 
 def read_forests(file: str | IO[bytes]) -> dict[str, Forest]:
     """Read the forests of an NPZ file, by name."""
@@ -43,23 +79,47 @@ def read_forests(file: str | IO[bytes]) -> dict[str, Forest]:
 def evaluate(forest: Forest, features: np.ndarray) -> np.ndarray:
     """Return the probability (N,) float64 that the forest gives each row of features (N, F) float32."""
     result = np.empty(len(features))
-    run_slices(_evaluate, len(features), forest.roots, forest.feature, forest.threshold, forest.right, features, result)
+    run_slices(_evaluate, len(features), features, forest.in_step, result)
     return result
 
 
 @kernel
-def probability(row, roots, feature, threshold, right):
-    """Return the probability that trees, laid out as in `Forest`, give one row of features."""
-    total = 0.0
-    for root in roots:
-        node = root
-        while feature[node] >= 0:
-            node = node + 1 if row[feature[node]] <= threshold[node] else right[node]
-        total += threshold[node]
-    return 1.0 / (1.0 + math.exp(-total))
+def _evaluate(start, stop, features, trees, result):
+    totals = np.empty(IN_STEP)
+    for first in range(start, stop, IN_STEP):
+        count = min(IN_STEP, stop - first)
+        add_up(features[first : first + count], trees, totals)
+        for row in range(count):
+            result[first + row] = chance(totals[row])
 
 
 @kernel
-def _evaluate(start, stop, roots, feature, threshold, right, features, result):
-    for row in range(start, stop):
-        result[row] = probability(features[row], roots, feature, threshold, right)
+def add_up(rows, trees, totals):
+    """Write what trees say of each of some rows, `IN_STEP` at most, into `totals` (IN_STEP,).
+
+    Eight rows go down a tree in step, without a branch to guess: the steps of one do not wait for those of another. Half
+    to a third of the time of one after the other.
+    """
+    roots, feature, threshold, child = trees.roots, trees.feature, trees.threshold, trees.child
+    nodes, last = np.empty(LANES, np.uint64), len(rows) - 1
+    totals[:] = 0.0
+    for root in roots:
+        for first in range(0, len(rows), LANES):
+            nodes[:] = root
+            moved = True
+            while moved:
+                moved = False
+                for lane in range(LANES):  # unsigned, or each index is looked at for being negative
+                    node, row = nodes[np.uint64(lane)], np.uint64(min(first + lane, last))
+                    further = not rows[row, np.uint64(feature[node])] <= threshold[node]
+                    to = np.uint64(child[np.uint64(2) * node + np.uint64(further)])
+                    nodes[np.uint64(lane)] = to
+                    moved |= to != node
+            for lane in range(LANES):
+                totals[first + lane] += threshold[nodes[np.uint64(lane)]]
+
+
+@kernel
+def chance(total):
+    """Return the probability of what trees sum up to: they are trained for its logit."""
+    return 1.0 / (1.0 + math.exp(-total))

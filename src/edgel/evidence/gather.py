@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from edgel.evidence import sectors, sheets, through
-from edgel.evidence.forest import probability
+from edgel.evidence.forest import IN_STEP, add_up, chance
 from edgel.evidence.scales import fit_scales, spacing_of
 from edgel.evidence.sectors import sector_gaps
 from edgel.evidence.sheets import fit_sheets
@@ -43,25 +43,26 @@ def survey(
     asked,
     scales,
     cloud,
-    roots,
-    feature,
-    threshold,
-    right,
+    trees,
     normals,
     likely,
 ):
     """Write the plane at each scale and, by the trees given, the chance of an edge, of the points at places `asked`."""
     cheap = 6 * len(scales) + 2
     vectors, fitted, found = np.empty((3, places.shape[1])), np.zeros((len(scales), 4)), np.zeros(cheap)
-    features = np.zeros(cheap + len(cloud), np.float32)
-    features[cheap:] = cloud
-    for q in range(places.shape[0]):
-        place = asked[query_order[first + q]]
-        relative(places[q], queries, first + q, xyz, vectors)
-        fit_scales(vectors, squared[q], scales, fitted, found)
-        normals[place] = fitted
-        features[:cheap] = found
-        likely[place] = probability(features, roots, feature, threshold, right)
+    features, totals = np.zeros((IN_STEP, cheap + len(cloud)), np.float32), np.empty(IN_STEP)
+    features[:, cheap:] = cloud
+    for begin in range(0, places.shape[0], IN_STEP):
+        count = min(IN_STEP, places.shape[0] - begin)
+        for i in range(count):
+            q = begin + i
+            relative(places[q], queries, first + q, xyz, vectors)
+            fit_scales(vectors, squared[q], scales, fitted, found)
+            normals[asked[query_order[first + q]]] = fitted
+            features[i, :cheap] = found
+        add_up(features[:count], trees, totals)
+        for i in range(count):
+            likely[asked[query_order[first + begin + i]]] = chance(totals[i])
 
 
 @kernel
@@ -80,7 +81,8 @@ def examine(
     spanned = np.empty((3, through.PLANES), np.float32)
     off = np.zeros((through.VOTERS, through.PLANES), np.float32)
     score = np.empty(through.PLANES, np.float32)
-    gaps, begins, ends = np.zeros(2 * len(counts)), np.empty(sectors.BINS), np.empty(sectors.BINS)
+    gaps, angles = np.zeros(2 * len(counts)), np.empty(k)
+    begins, ends = np.empty(sectors.BINS), np.empty(sectors.BINS)
     for q in range(places.shape[0]):
         row, own = query_order[first + q], places[q, 0]
         features = out[row]
@@ -102,5 +104,5 @@ def examine(
             planes_through(vectors, int(votes[j, 0]), spacing, votes[j, 1], cos_min, spanned, off, score, of_votes)
             features[at : at + len(of_votes)] = of_votes
             at += len(of_votes)
-        sector_gaps(vectors, squared[q], normals[own], counts, begins, ends, gaps)
+        sector_gaps(vectors, squared[q], normals[own], counts, angles, begins, ends, gaps)
         features[at : at + len(gaps)] = gaps
