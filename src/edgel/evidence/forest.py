@@ -97,8 +97,8 @@ def _evaluate(start, stop, features, trees, result):
 def add_up(rows, trees, totals):
     """Write what trees say of each of some rows, `IN_STEP` at most, into `totals` (IN_STEP,).
 
-    Eight rows go down a tree in step, without a branch to guess: the steps of one do not wait for those of another. Half
-    to a third of the time of one after the other.
+    Eight rows go down a tree in step, without a branch to guess: the steps of one do not wait for those of another.
+    In a half to a third of the time of one after the other.
     """
     roots, feature, threshold, child = trees.roots, trees.feature, trees.threshold, trees.child
     nodes, last = np.empty(LANES, np.uint64), len(rows) - 1
