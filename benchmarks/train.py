@@ -28,6 +28,10 @@ from edgel.kdtree import build_index, leaf_starts
 CACHE = Path(__file__).parent / "cache" / "training"
 OUT = Path(evidence.__file__).parent / evidence.WEIGHTS
 GLANCES = CACHE / "glances.npz"
+SPREAD = CACHE / "spread.npy"
+CLOUD = slice(
+    evidence.NUM_CHEAP - evidence.NUM_CLOUD, evidence.NUM_CHEAP
+)  # columns that say what is typical of the cloud
 SKIMMED = 500  # scenes that the trees of the first glances learn from
 KINDS = ("crease", "outline")
 FIRST = {"crease": (160, 31), "outline": (100, 31)}  # trees and leaves of each forest
@@ -37,6 +41,7 @@ COARSE = (100, 15)
 LOOSE = 0.5  # of the screen's threshold: points it would nearly look at are examined in training too
 UNLIKELY = 0.02  # share of all the others
 NEAR, SHARE_NEAR, SHARE_FAR = 3.0, 0.4, 0.15  # of points that are no edge, within so many spacings of one or not
+VAGUE = 0.1  # of its spread among the scenes: error added, point by point, to what is typical of the cloud
 OPTIONS = {
     "objective": "binary",
     "min_data_in_leaf": 40,
@@ -61,6 +66,10 @@ def main() -> None:
         points, wanted, weights, leaves, edge = (
             np.concatenate(part) for part in zip(*pool.imap(skim, skimmed), strict=True)
         )
+        spread = points[:, -evidence.NUM_CLOUD :].std(axis=0)
+        np.save(SPREAD, spread)
+        blur(points, slice(-evidence.NUM_CLOUD, None), spread, 0)
+        blur(leaves, slice(-evidence.NUM_CLOUD, None), spread, 1)
         print(f"{len(points):,} points and {len(leaves):,} leaves skimmed", flush=True)
         glances = {
             "screen": grow(points, wanted, weights, SCREEN, 0.1),
@@ -148,6 +157,12 @@ def prepare(seed: int) -> Path:
     return path
 
 
+def blur(features: np.ndarray, columns: slice, spread: np.ndarray, seed: int) -> None:
+    """Add errors to what is typical of the cloud: else trees know a scene by its exact numbers, and learn it by heart."""
+    noise = np.random.default_rng([seed, 2]).standard_normal((len(features), len(spread)))
+    features[:, columns] += (VAGUE * spread * noise).astype(np.float32)
+
+
 def chosen(stored: Sequence, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Which of the examined points are learned from, and how much each counts: all on edges, a share of the others."""
     edge = stored["labels"].any(axis=1)
@@ -159,7 +174,9 @@ def chosen(stored: Sequence, seed: int) -> tuple[np.ndarray, np.ndarray]:
 def load(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     with np.load(CACHE / f"{seed}.npz") as stored:
         kept, weights = chosen(stored, seed)
-        return stored["features"][kept], stored["labels"][kept], weights
+        features = stored["features"][kept]
+        blur(features, CLOUD, np.load(SPREAD), seed)
+        return features, stored["labels"][kept], weights
 
 
 def look_around(job: tuple[int, dict[str, Forest]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -175,8 +192,9 @@ def look_around(job: tuple[int, dict[str, Forest]]) -> tuple[np.ndarray, np.ndar
         index, stored["places"][good], found, chances["crease"][good], chances["outline"][good]
     )
     kept, weights = chosen(stored, seed)
-    of_kept = good[kept]
-    return features[kept[good]], stored["labels"][kept & good], weights[of_kept]
+    features, of_kept = features[kept[good]], good[kept]
+    blur(features, CLOUD, np.load(SPREAD), seed)
+    return features, stored["labels"][kept & good], weights[of_kept]
 
 
 def train(job: tuple[str, tuple[int, int], int | None]) -> Forest:

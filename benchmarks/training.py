@@ -19,6 +19,7 @@ MIN_TURN = np.radians(25.0)
 
 
 RELIEFS = 0.1  # share of the examples
+IN_STEPS = 0.3  # share of the views whose depth comes in steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,11 +74,23 @@ def scene(rng: np.random.Generator) -> Scene:
         direction = rng.standard_normal(3)
         projection = synth.PROJECTIONS[rng.integers(3)]
         spacing = np.sqrt(solid.area / 2.2 / points)
-        return synth.view(
+        seen = synth.view(
             solid, projection=projection, spacing=spacing, direction=direction, roll=rng.uniform(-3, 3), **degraded
         )
+        return in_steps(seen, projection, rng) if rng.random() < IN_STEPS else seen
     pattern = rng.choice(synth.PATTERNS, p=[0.17, 0.17, 0.14, 0.14, 0.38])
     return synth.sample(solid, pattern=str(pattern), spacing=np.sqrt(solid.area / points), **degraded)
+
+
+def in_steps(scene: Scene, projection: str, rng: np.random.Generator) -> Scene:
+    """Round the depths of a view to whole steps, as depth cameras do: a slanted face becomes a staircase."""
+    xyz, step = scene.cloud.xyz.copy(), scene.spacing * float(_spread(rng, 0.2, 3, 1)[0])
+    if projection == "orthographic":
+        xyz[:, 2] = step * np.round(xyz[:, 2] / step)
+    else:
+        depth = np.linalg.norm(xyz, axis=1) if projection == "spherical" else xyz[:, 2].copy()
+        xyz *= (step * np.round(depth / step) / depth)[:, None]
+    return replace(scene, cloud=replace(scene.cloud, xyz=xyz))
 
 
 def labels(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
