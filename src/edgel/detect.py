@@ -120,7 +120,7 @@ def detect(
         if not surveyed.has_surface:
             raise ValueError("points: all lie on one line or spot, so there is no surface whose edges could be found")
     with stages("view"):
-        viewing = look(cloud, checked.xyz, checked.rows, method, viewpoint)
+        viewing = look(cloud, checked.xyz, checked.rows, index, method, viewpoint)
     with stages("evidence"):
         verdict = judge(index, surveyed)
     with stages("decision"):

@@ -8,12 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from edgel.cloud import Cloud
+from edgel.kdtree import NeighborIndex
 from edgel.raster import Raster, organized, orthographic, pinhole, spherical
 
 METHODS = ("auto", "surface", "organized", "orthographic", "pinhole", "spherical")
 
 SHOWN = 0.97  # least share of the points that one view has to show
 DEPTH = 3.0  # spacings behind the nearest point of its pixel within which a point still shows
+_SAMPLE = 50_000  # points at which directions are compared
 _CAMERA = 0.5  # least cosine to the mean ray in the view of a camera
 _RINGS = (8, 256)  # how many lasers a spinning sensor has
 _RING_SHOTS = 100  # least mean number of shots of each
@@ -126,7 +128,9 @@ def _from_viewpoint(project: Callable[..., Raster], xyz: np.ndarray, viewpoint: 
     return replace(raster, index=np.where(raster.index >= 0, rows[raster.index], -1), behind=behind)
 
 
-def look(cloud: Cloud, xyz: np.ndarray, rows: np.ndarray, method: str, viewpoint: np.ndarray | None) -> Viewing:
+def look(
+    cloud: Cloud, xyz: np.ndarray, rows: np.ndarray, index: NeighborIndex, method: str, viewpoint: np.ndarray | None
+) -> Viewing:
     """Look at a cloud in the way that is asked for, or ("auto") the best one; the raster is there unless "surface".
 
     Parameters
@@ -136,6 +140,8 @@ def look(cloud: Cloud, xyz: np.ndarray, rows: np.ndarray, method: str, viewpoint
         Its finite points.
     rows : (N,) int64
         Their rows in the cloud.
+    index : NeighborIndex
+        Of them.
     method : str
         One of `METHODS`.
     viewpoint : (3,) float64 or None
@@ -149,7 +155,8 @@ def look(cloud: Cloud, xyz: np.ndarray, rows: np.ndarray, method: str, viewpoint
     if viewing.raster is not None or viewing.method == "surface":
         return viewing
     if viewing.method == "orthographic":
-        raster, _ = _best_direction(xyz, viewpoint)
+        sample = index.at(np.arange(0, len(index), max(len(index) // _SAMPLE, 1)))
+        raster = orthographic(xyz, _best_direction(xyz, sample, viewpoint))
     elif viewing.method == "organized":
         if cloud.shape is None or min(cloud.shape) < 2:
             raise ValueError("method: 'organized' needs points in a grid, (H, W, 3); use 'auto' for a list of points")
@@ -161,17 +168,16 @@ def look(cloud: Cloud, xyz: np.ndarray, rows: np.ndarray, method: str, viewpoint
     return Viewing(viewing.method, viewing.reason, raster)
 
 
-def _best_direction(xyz: np.ndarray, viewpoint: np.ndarray | None) -> tuple[Raster | None, float]:
-    """Return the orthographic view that shows most, and the share of the points that it shows."""
-    best, most = None, -1.0
+def _best_direction(xyz: np.ndarray, sample: np.ndarray, viewpoint: np.ndarray | None) -> np.ndarray:
+    """Return the direction whose orthographic view of a sample (M, 3) of the points shows most of it."""
+    best, most = np.array([0.0, 0.0, -1.0]), -1.0
     for direction in _directions(xyz):
         if viewpoint is not None and direction @ (xyz.mean(axis=0) - viewpoint) < 0:
             direction = -direction
-        raster = orthographic(xyz, direction)
-        share = shown(raster)
+        share = shown(orthographic(sample, direction))
         if share > most + 1e-3:  # earlier candidates, the view from above first, win a draw
-            best, most = raster, share
-    return best, most
+            best, most = direction, share
+    return best
 
 
 def shown(raster: Raster) -> float:

@@ -253,7 +253,10 @@ def summary(edges: Edges, by_stage: dict[str, float]) -> list[tuple[str, ...]]:
         rows.append(("normals undefined", count(edges.num_without_normal), "the neighbours span no plane"))
     rows.append(("method", edges.method, edges.reason))
     rows.append(("time", seconds(sum(by_stage.values()))))
-    return rows + [(f"  {name}", seconds(duration)) for name, duration in by_stage.items()]
+    rows += [(f"  {name}", seconds(duration)) for name, duration in by_stage.items()]
+    if (peak := peak_memory()) is not None:
+        rows.append(("memory", f"{peak / 1e6:,.0f} MB", "at most, that of the program itself included"))
+    return rows
 
 
 def peak_memory() -> int | None:
