@@ -22,9 +22,12 @@ from typing import Any
 
 import accuracy
 import geometry
+import growth
 import normals
+import promises
 import published
 import report
+import roofline
 import scenes
 import speed
 from answers import answer
@@ -64,6 +67,9 @@ def main() -> None:
         slowest = 2.0 if options.quick else speed.SLOWEST
         results["speed"] = speed.normals_of_all_points(sizes, slowest=slowest) + speed.edges(sizes, slowest)
         results["stages"] = speed.stages()
+        results["roofline"] = roofline.run(min(sizes[-1], 647_984), 3 if options.quick else 7)
+        results["promises"] = [] if options.quick else promises.run()
+        results["growth"] = [] if options.quick else growth.run([1, 4, 16, 32], 100.0, rounds=2)
     results["minutes"] = (time.perf_counter() - start) / 60
     path = (
         HERE / "results" / f"{results['machine']['date']}-{results['machine']['commit']}{'-quick' * options.quick}.json"

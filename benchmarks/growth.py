@@ -1,7 +1,8 @@
 """Time and memory for each point as clouds grow: the paper's method, a projection, and the surface.
 
 Run: python benchmarks/growth.py [--sizes 1 2 4 8 16 32] [--projection-to 100] (millions of points). Each size runs in a
-process of its own, so that peaks of memory are its own. Prints a table in Markdown, writes docs/benchmarks/growth.png.
+process of its own, so that peaks of memory are its own. Prints a table in Markdown, writes docs/benchmarks/growth.png; make bench
+measures the same, with fewer rounds.
 Peaks are known on Linux only.
 """
 
@@ -12,10 +13,13 @@ import json
 import subprocess
 import sys
 import time
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
 import edgel
 
@@ -77,45 +81,60 @@ def measure(method: str, count: int, rounds: int) -> dict[str, Any]:
     }
 
 
+def run(sizes: Sequence[float], projection_to: float, rounds: int) -> list[dict[str, Any]]:
+    """Measure each method at each size (millions of points), in a process of its own."""
+    rows = []
+    for method in METHODS:
+        further = [projection_to] if method == "paper" and projection_to > max(sizes) else []
+        for size in [*sizes, *further]:
+            call = [sys.executable, __file__, "--rounds", str(rounds), "--one", method, str(round(size * 1e6))]
+            done = subprocess.run(call, capture_output=True, text=True)
+            if done.returncode:
+                why = (done.stderr.strip() or "killed").splitlines()[-1]
+                print(f"  {method}, {size:g} million points: failed: {why}", flush=True)
+                break
+            rows.append(json.loads(done.stdout))
+            row = rows[-1]
+            print(
+                f"  {method}, {row['points']:,} points: {row['seconds']:.2f} s, {row['bytes']:.0f} bytes each",
+                flush=True,
+            )
+    return rows
+
+
+def table(rows: Sequence[Mapping[str, Any]]) -> str:
+    lines = [
+        "| method | points | seconds | ns a point | times the first | peak above the input, bytes a point |",
+        "|---|---|---|---|---|---|",
+    ]
+    first = {row["method"]: row["seconds"] / row["points"] for row in reversed(rows)}
+    for row in rows:
+        each = row["seconds"] / row["points"]
+        lines.append(
+            f"| {row['method']} | {row['points']:,} | {row['seconds']:.3f} | {1e9 * each:.0f} | "
+            f"{each / first[row['method']]:.2f} | {row['bytes']:.0f} |"
+        )
+    return "\n".join(lines)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sizes", type=float, nargs="+", default=[1, 2, 4, 8, 16, 32])
-    parser.add_argument("--projection-to", type=float, default=100.0, help="one size more for paper and projection")
+    parser.add_argument("--projection-to", type=float, default=100.0, help="one size more for the paper")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--one", nargs=2, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.one:
         print(json.dumps(measure(options.one[0], int(options.one[1]), options.rounds)))
         return
-    rows = []
-    print("| method | points | seconds | ns/point | times the first | peak above the input, B/point |")
-    print("|---|---|---|---|---|---|")
-    for method in METHODS:
-        further = [options.projection_to] if method != "surface" and options.projection_to > max(options.sizes) else []
-        first = 0.0
-        for size in [*options.sizes, *further]:
-            call = [sys.executable, __file__, "--rounds", str(options.rounds), "--one", method, str(round(size * 1e6))]
-            run = subprocess.run(call, capture_output=True, text=True)
-            if run.returncode:
-                print(f"| {method} | {size * 1e6:,.0f} | failed: {(run.stderr.strip() or 'killed').splitlines()[-1]} |")
-                break
-            row = json.loads(run.stdout)
-            rows.append(row)
-            each = row["seconds"] / row["points"]
-            first = first or each
-            print(
-                f"| {method} | {row['points']:,} | {row['seconds']:.3f} | {1e9 * each:.0f} | {each / first:.2f} | "
-                f"{row['bytes']:.0f} |",
-                flush=True,
-            )
-    plot(rows)
+    rows = run(options.sizes, options.projection_to, options.rounds)
+    print(table(rows))
+    FigureCanvasAgg(plot(rows)).print_png(str(DOCS / "growth.png"))
+    print(f"{DOCS / 'growth.png'}: the plot")
 
 
-def plot(rows: list[dict[str, Any]]) -> None:
+def plot(rows: Sequence[Mapping[str, Any]]) -> Figure:
     """Draw nanoseconds a point over the number of points."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     figure = Figure(figsize=(7, 4), layout="constrained")
     axes = figure.add_subplot()
     for method in METHODS:
@@ -126,8 +145,7 @@ def plot(rows: list[dict[str, Any]]) -> None:
     axes.set(xscale="log", yscale="log", xlabel="points", ylabel="ns for each point", title="edgel.detect, two threads")
     axes.grid(alpha=0.3)
     axes.legend()
-    FigureCanvasAgg(figure).print_png(str(DOCS / "growth.png"))
-    print(f"{DOCS / 'growth.png'}: the plot")
+    return figure
 
 
 if __name__ == "__main__":

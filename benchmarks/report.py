@@ -7,8 +7,11 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+import growth
 import numpy as np
+import promises
 import published
+import roofline
 from accuracy import ANGLE_BINS, TOLERANCES
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -32,6 +35,8 @@ def write(results: dict[str, Any]) -> Path:
     if "speed" in results:
         plots["time-normals.png"] = _plot_time(results["speed"], "normals of all points")
         plots["time-edges.png"] = _plot_time(results["speed"], "edges")
+        if results["growth"]:
+            plots["growth.png"] = growth.plot(results["growth"])
     for name, figure in plots.items():
         FigureCanvasAgg(figure).print_png(str(DOCS / "benchmarks" / name))
     path = DOCS / "benchmarks.md"
@@ -114,11 +119,24 @@ def _page(results: dict[str, Any], rows: list[Row]) -> Iterable[str]:
         yield "Stages of both presets at 647,984 points."
         table = [[s["preset"], s["stage"], f"{s['seconds']:.4f}"] for s in results["stages"]]
         yield _table(["preset", "stage", "s"], table)
+        yield from _limits(results)
     yield "## Parameters\n\nLengths in spacings, angles in degrees; *tuned* for each level of noise. Every grid entry tried and its mean is in `benchmarks/tuned.json`."
     yield _parameters(results["tuning"])
     pictures = DOCS / "benchmarks" / "pictures.md"
     if pictures.exists():
         yield pictures.read_text().strip()
+
+
+def _limits(results: dict[str, Any]) -> Iterable[str]:
+    if results["promises"]:
+        yield "### What edgel promises\n\nMedians of interleaved rounds on 2 threads, indexes included (`benchmarks/promises.py`)."
+        yield promises.table(results["promises"])
+    yield "### How far from the limit\n\nBytes that have to move and operations that have to be done, at least, of each stage on the tee (`benchmarks/roofline.py`)."
+    yield roofline.table(results["roofline"])
+    if results["growth"]:
+        yield "### Growth\n\nA wavy plateau, each size in a process of its own (`benchmarks/growth.py`); *projection* is the default detector with its outlines from an orthographic view."
+        yield growth.table(results["growth"])
+        yield "![time a point as clouds grow](benchmarks/growth.png)"
 
 
 def _geometry(rows: Sequence[Row]) -> str:

@@ -9,12 +9,13 @@ from __future__ import annotations
 import argparse
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from edgel import paper, synth
+from edgel import evidence, paper, synth
 from edgel.kdtree import _SHARED_LEVELS, bounds, build_index
 from edgel.neighbors import visit_neighbors
 from edgel.normals import by_offset, fit_planes
@@ -33,7 +34,7 @@ class Stage:
     name: str
     work: Callable[[], object]
     bytes: float
-    operations: float
+    operations: float = 0.0  # not counted
 
 
 @kernel
@@ -48,7 +49,7 @@ def _look(first, places, squared, queries, order, xyz):
 
 
 def stages(points: np.ndarray) -> list[Stage]:
-    """The stages of the paper's method and of normals at all points."""
+    """The stages of the paper's method, of normals at all points, and the two long ones of the default detector."""
     lower, upper = bounds(points)
     grid = paper.choose_grid(points, None, None)
     image = np.pad(grey_image(project(points, grid), grid, 100.0), grid.frame)
@@ -56,6 +57,7 @@ def stages(points: np.ndarray) -> list[Stage]:
     window = paper.choose_tolerance(None, grid)
     rows = back_project(points, grid, found.edges, found.magnitude, window).rows
     share, index = len(rows) / len(points), build_index(points)
+    surveyed = evidence.survey(index)
     levels = max(-(-len(points) // 16) - 1, 1).bit_length()
     search = CANDIDATES * (8 + 6 * COUNTS)
     pixels = image.size / len(points)
@@ -83,6 +85,9 @@ def stages(points: np.ndarray) -> list[Stage]:
         Stage(
             "lists of neighbours", lambda: visit_neighbors(_look, index, index, K), 32 + 32 * K, search + CANDIDATES * 3
         ),
+        # Of the default detector; how much is computed depends on the cloud.
+        Stage("survey", lambda: evidence.survey(index), 24 + 2 * 48 + 8),
+        Stage("evidence", lambda: evidence.judge(index, surveyed), 8),
     ]
 
 
@@ -93,12 +98,10 @@ def seconds(work: Callable[[], object], threads: int) -> float:
     return time.perf_counter() - start
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--points", type=int, default=647_984)
-    parser.add_argument("--rounds", type=int, default=7)
-    options = parser.parse_args()
-    points = synth.scan(synth.tee(), num_points=options.points).cloud.xyz
+def run(num_points: int, rounds: int) -> list[dict[str, Any]]:
+    """Measure all stages with one and two threads; the first row is the copy, which has no stage's figures."""
+    before = os.environ.get("EDGEL_NUM_THREADS")
+    points = synth.scan(synth.tee(), num_points=num_points).cloud.xyz
     source = np.zeros(max(32_000_000, points.size))
     target = np.empty_like(source)
     copy = Stage("copy", lambda: run_slices(_copy, len(source), source, target, size=1 << 20), 0, 0)
@@ -106,26 +109,59 @@ def main() -> None:
     times = {(stage.name, threads): [] for stage in every for threads in (1, 2)}
     for stage in every:
         seconds(stage.work, 2)  # compiles
-    for _ in range(options.rounds):
+    for _ in range(rounds):
         for stage in every:
             for threads in (1, 2):
                 times[stage.name, threads].append(seconds(stage.work, threads))
+    os.environ.pop("EDGEL_NUM_THREADS")
+    if before is not None:
+        os.environ["EDGEL_NUM_THREADS"] = before
     median = {key: float(np.median(each)) for key, each in times.items()}
     # A copy reads the source, and reads and writes the target: processors fetch a line before they change it.
     bandwidth = {threads: 24 * len(source) / median["copy", threads] for threads in (1, 2)}
-    print(
-        f"{len(points):,} points; copy: {bandwidth[1] / 1e9:.1f} GB/s one thread, {bandwidth[2] / 1e9:.1f} GB/s two\n"
-    )
-    print("| stage | B/point | operations/point | 1 thread, ms | 2 threads, ms | gain | GB/s | of the copy | Gop/s |")
-    print("|---|---|---|---|---|---|---|---|---|")
-    for stage in every[1:]:
-        one, two = median[stage.name, 1], median[stage.name, 2]
-        moved = stage.bytes * len(points) / two
-        print(
-            f"| {stage.name} | {stage.bytes:.0f} | {stage.operations:.0f} | {1e3 * one:.1f} | {1e3 * two:.1f} | "
-            f"{one / two:.2f} | {moved / 1e9:.1f} | {moved / bandwidth[2]:.0%} | "
-            f"{stage.operations * len(points) / two / 1e9:.1f} |"
+    return [
+        {
+            "stage": stage.name,
+            "points": len(points),
+            "bytes": stage.bytes,
+            "operations": stage.operations,
+            "one": median[stage.name, 1],
+            "two": median[stage.name, 2],
+            "copy one": bandwidth[1],
+            "copy two": bandwidth[2],
+        }
+        for stage in every[1:]
+    ]
+
+
+def table(rows: Sequence[Mapping[str, Any]]) -> str:
+    lines = [
+        f"{rows[0]['points']:,} points; a copy moves {rows[0]['copy one'] / 1e9:.1f} GB/s with one thread, "
+        f"{rows[0]['copy two'] / 1e9:.1f} GB/s with two.",
+        "",
+        "| stage | bytes a point | operations a point | 1 thread, ms | 2 threads, ms | gain | GB/s | of the copy | Gop/s |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for row in rows:
+        moved, done = (row[what] * row["points"] / row["two"] for what in ("bytes", "operations"))
+        lines.append(
+            f"| {row['stage']} | {row['bytes']:.0f} | {_or_blank(row['operations'], 0)} | {1e3 * row['one']:.1f} | "
+            f"{1e3 * row['two']:.1f} | {row['one'] / row['two']:.2f} | {moved / 1e9:.1f} | "
+            f"{moved / row['copy two']:.0%} | {_or_blank(done / 1e9, 1)} |"
         )
+    return "\n".join(lines)
+
+
+def _or_blank(value: float, digits: int) -> str:
+    return f"{value:.{digits}f}" if value else ""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--points", type=int, default=647_984)
+    parser.add_argument("--rounds", type=int, default=7)
+    options = parser.parse_args()
+    print(table(run(options.points, options.rounds)))
 
 
 if __name__ == "__main__":
