@@ -123,7 +123,8 @@ def test_detect_without_output_shows_the_summary_and_how_to_write(scan):
     result = run("detect", scan, *PAPER)
     assert result.exit_code == 0
     assert "add -o" in result.stderr
-    assert sys.platform == "win32" or int(re.search(r"memory +([\d,]+) MB", result.stderr)[1].replace(",", "")) > 50
+    memory = re.search(r"memory +([\d,]+) MB", result.stderr)
+    assert sys.platform == "win32" or (memory is not None and int(memory[1].replace(",", "")) > 50)
 
 
 def test_detect_json(scan, tmp_path):
