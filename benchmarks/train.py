@@ -41,7 +41,7 @@ COARSE = (100, 15)
 LOOSE = 0.5  # of the screen's threshold: points it would nearly look at are examined in training too
 UNLIKELY = 0.02  # share of all the others
 NEAR, SHARE_NEAR, SHARE_FAR = 3.0, 0.4, 0.15  # of points that are no edge, within so many spacings of one or not
-VAGUE = 0.1  # of its spread among the scenes: error added, point by point, to what is typical of the cloud
+VAGUE = 0.07  # of its spread among the scenes: error added, point by point, to what is typical of the cloud
 OPTIONS = {
     "objective": "binary",
     "min_data_in_leaf": 40,

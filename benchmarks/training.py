@@ -19,7 +19,7 @@ MIN_TURN = np.radians(25.0)
 
 
 RELIEFS = 0.1  # share of the examples
-IN_STEPS = 0.3  # share of the views whose depth comes in steps
+IN_STEPS = 0.4  # share of the views that are those of a depth camera
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,14 +83,24 @@ def scene(rng: np.random.Generator) -> Scene:
 
 
 def in_steps(scene: Scene, projection: str, rng: np.random.Generator) -> Scene:
-    """Round the depths of a view to whole steps, as depth cameras do: a slanted face becomes a staircase."""
-    xyz, step = scene.cloud.xyz.copy(), scene.spacing * float(_spread(rng, 0.2, 3, 1)[0])
+    """See a scene as depth cameras do: errors alike in neighbouring pixels, and depths rounded to whole steps.
+
+    A slanted face becomes a staircase whose stairs have ragged rims.
+    """
+    xyz = scene.noise_free
+    depth = np.linalg.norm(xyz, axis=1) if projection == "spherical" else xyz[:, 2]
+    step, error = scene.spacing * _spread(rng, 0.2, 3, 2)
+    field = rng.standard_normal(scene.cloud.shape)
+    for _ in range(rng.integers(1, 7)):  # patches of a few pixels
+        for axis in (0, 1):
+            field = (np.roll(field, -1, axis) + 2 * field + np.roll(field, 1, axis)) / 4
+    error *= rng.uniform(0, 0.5) / field.std()
+    measured = np.where(scene.outlier, depth, step * np.round((depth + error * field.ravel()) / step))
     if projection == "orthographic":
-        xyz[:, 2] = step * np.round(xyz[:, 2] / step)
+        moved = np.column_stack([xyz[:, :2], measured])
     else:
-        depth = np.linalg.norm(xyz, axis=1) if projection == "spherical" else xyz[:, 2].copy()
-        xyz *= (step * np.round(depth / step) / depth)[:, None]
-    return replace(scene, cloud=replace(scene.cloud, xyz=xyz))
+        moved = xyz * (measured / depth)[:, None]
+    return replace(scene, cloud=replace(scene.cloud, xyz=moved))
 
 
 def labels(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
