@@ -10,7 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel.parallel import kernel, run_slices
+from edgel.parallel import kernel, part, run_slices
+
+_PARTS = 4  # of the points, drawn at once
 
 
 @dataclass(frozen=True)
@@ -103,8 +105,13 @@ def project(xyz: np.ndarray, grid: PixelGrid) -> np.ndarray:
     (H, W) float64
         NaN where no point falls.
     """
-    highest = np.full(grid.height * grid.width, -np.inf)
-    _highest(pixel_coordinates(xyz, grid), xyz, highest)
+    pixels = grid.height * grid.width
+    # Each part of the points has an image of its own, so that they are drawn at once, where images are the smaller.
+    parts = _PARTS if _PARTS * pixels < len(xyz) else 1
+    size = -(-len(xyz) // parts)
+    images = np.full((parts, pixels), -np.inf)
+    run_slices(_highest, len(xyz), size, xyz, grid.lower, grid.upper, grid.width, grid.height, images, size=size)
+    highest = images.max(axis=0)
     highest[np.isneginf(highest)] = np.nan
     return highest.reshape(grid.height, grid.width)
 
@@ -123,8 +130,9 @@ def occupied_spacing(xyz: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> f
     cell = float(np.sqrt(8 * extent[0] * extent[1] / len(xyz)))
     width, height = (max(int(np.ceil(length / cell)), 1) for length in extent)
     grid = PixelGrid(width, height, lower, upper)
-    occupied = np.count_nonzero(np.bincount(pixel_coordinates(xyz, grid), minlength=1))
-    return float(np.sqrt(occupied * np.prod(grid.pixel) / len(xyz)))
+    occupied = np.zeros(width * height, np.bool_)
+    run_slices(_occupied, len(xyz), xyz, lower, upper, width, height, occupied, size=65536)
+    return float(np.sqrt(np.count_nonzero(occupied) * np.prod(grid.pixel) / len(xyz)))
 
 
 def back_project(
@@ -178,9 +186,9 @@ def points_near(xyz: np.ndarray, grid: PixelGrid, rows: np.ndarray, distance: fl
     pixels = np.zeros(grid.height * grid.width, np.bool_)
     pixels[pixel_coordinates(xyz[rows], grid)] = True
     across, along = (int(min(distance / side * (1 + 1e-9), 1e6)) + 1 for side in grid.pixel)
-    close = _grown(pixels.reshape(grid.height, grid.width), across, along)
+    close = _grown(pixels.reshape(grid.height, grid.width), across, along).ravel()
     found = np.empty(len(xyz), np.bool_)
-    run_slices(_in_pixels, len(xyz), xyz, grid.lower, grid.upper, close, found, size=65536)
+    run_slices(_in_pixels, len(xyz), xyz, grid.lower, grid.upper, grid.width, grid.height, close, found, size=65536)
     return np.flatnonzero(found)
 
 
@@ -198,29 +206,39 @@ def _summed(values: np.ndarray) -> np.ndarray:
     return np.pad(values.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
 
 
+@part
+def _pixel_of(xyz, p, lower, upper, width, height):
+    """The pixel of a point (eq. 3-4), flat."""
+    col = min(int(width * (xyz[p, 0] - lower[0]) / (upper[0] - lower[0])), width - 1)
+    row = min(int(height * (xyz[p, 1] - lower[1]) / (upper[1] - lower[1])), height - 1)
+    return row * width + col
+
+
 @kernel
 def _pixels(start, stop, xyz, lower, upper, width, height, pixels):
-    extent_x, extent_y = upper[0] - lower[0], upper[1] - lower[1]
     for p in range(start, stop):
-        col = min(int(width * (xyz[p, 0] - lower[0]) / extent_x), width - 1)
-        row = min(int(height * (xyz[p, 1] - lower[1]) / extent_y), height - 1)
-        pixels[p] = row * width + col
+        pixels[p] = _pixel_of(xyz, p, lower, upper, width, height)
 
 
 @kernel
-def _in_pixels(start, stop, xyz, lower, upper, pixels, found):
-    height, width = pixels.shape
+def _occupied(start, stop, xyz, lower, upper, width, height, occupied):
     for p in range(start, stop):
-        col = min(int(width * (xyz[p, 0] - lower[0]) / (upper[0] - lower[0])), width - 1)
-        row = min(int(height * (xyz[p, 1] - lower[1]) / (upper[1] - lower[1])), height - 1)
-        found[p] = pixels[row, col]
+        occupied[_pixel_of(xyz, p, lower, upper, width, height)] = True  # whoever comes first: the same is written
 
 
 @kernel
-def _highest(pixels, xyz, highest):
-    for p in range(len(pixels)):
-        if xyz[p, 2] > highest[pixels[p]]:
-            highest[pixels[p]] = xyz[p, 2]
+def _in_pixels(start, stop, xyz, lower, upper, width, height, pixels, found):
+    for p in range(start, stop):
+        found[p] = pixels[_pixel_of(xyz, p, lower, upper, width, height)]
+
+
+@kernel
+def _highest(start, stop, size, xyz, lower, upper, width, height, images):
+    highest = images[start // size]
+    for p in range(start, stop):
+        pixel = _pixel_of(xyz, p, lower, upper, width, height)
+        if xyz[p, 2] > highest[pixel]:
+            highest[pixel] = xyz[p, 2]
 
 
 @kernel
