@@ -17,6 +17,7 @@ from edgel.evidence.sectors import sector_gaps
 from edgel.evidence.sheets import fit_sheets
 from edgel.evidence.through import planes_through, span_planes
 from edgel.kdtree import build_index, leaf_starts
+from edgel.lanes import LANES
 from edgel.neighbors import visit_neighbors
 
 
@@ -78,17 +79,62 @@ def test_two_planes_of_a_clean_roof_are_its_faces():
 
 
 def fitted(vectors, count):
-    normals, cheap = np.zeros((len(SCALES), 4)), np.zeros(scales.NUM_FEATURES)
-    squared = (vectors**2).sum(axis=1)
-    fit_scales(rows(vectors), squared, np.array(SCALES), normals, cheap)
-    planes = np.tile(normals[0].astype(np.float32), (len(vectors), 1))
-    for i in range(len(vectors)):  # the small plane of each neighbour
-        near = np.argsort(((vectors - vectors[i]) ** 2).sum(axis=1))[:8]
-        planes[i, :3], planes[i, 3] = naive.covariance_plane(vectors[near])[0], 1
-    features, found = np.empty(sheets.NUM_FEATURES), np.empty(sheets.SHEETS)
-    room = np.empty((12, sheets.SHEETS))
-    fit_sheets(rows(vectors), np.arange(len(vectors)), squared, count, 1.0, planes, room, features, found)
-    return features, found
+    """What two planes make of one neighbourhood, in the third of eight lanes."""
+    lanes = [neighbourhood(np.random.default_rng(i), len(vectors)) for i in range(LANES)]
+    lanes[2] = vectors
+    features, found = fitted_in_step(lanes, count)
+    return features[2], found[2]
+
+
+def fitted_in_step(lanes, count):
+    around = np.zeros((LANES, count, 4))
+    for planes, vectors in zip(around, lanes, strict=True):
+        for i in range(count):  # the small plane of each neighbour
+            near = np.argsort(((vectors - vectors[i]) ** 2).sum(axis=1))[:8]
+            planes[i, :3], planes[i, 3] = naive.covariance_plane(vectors[near])[0], 1
+    room, features, found = sheets.make_room(), np.empty(sheets.NUM_FEATURES * LANES), np.empty(sheets.SHEETS * LANES)
+    fit_sheets(in_step(lanes), in_step(around), count, np.ones(LANES), room, features, found)
+    return features.reshape(-1, LANES).T, found.reshape(-1, LANES).T
+
+
+def in_step(lanes):
+    """Lay eight lists of vectors out as rows of eight."""
+    return np.ascontiguousarray(np.transpose(lanes, (2, 1, 0))).reshape(np.shape(lanes)[2], -1)
+
+
+@pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")  # the naive plane of points at one place
+def test_points_without_two_planes_leave_those_in_the_other_lanes_alone():
+    rng = np.random.default_rng(7)
+    good = [neighbourhood(np.random.default_rng(seed)) for seed in range(LANES)]
+    expected, hinges = fitted_in_step(good, 24)
+    place, flat, line = (
+        np.zeros((96, 3)),
+        rng.uniform(-5, 5, (96, 3)) * [1, 1, 0],
+        rng.uniform(-5, 5, (96, 1)) * [1, 2, 0],
+    )
+    lanes = list(good)
+    lanes[0], lanes[3], lanes[5] = (v[np.argsort((v**2).sum(axis=1))] for v in (place, flat, line))
+    features, found = fitted_in_step(lanes, 24)
+    others = [1, 2, 4, 6, 7]
+    assert np.array_equal(features[others], expected[others])
+    assert np.array_equal(found[others], hinges[others])
+    assert not features[0].any()
+    assert not found[[0, 3]].any()
+    assert features[3, [2, 5, 6, 7, 11]] == pytest.approx([features[3, 0], 4, 4, 4, 2])
+    assert np.isfinite(features).all()
+    assert np.isfinite(found).all()
+
+
+@pytest.mark.parametrize("count", [1, 7, 8, 9, 20])
+def test_evidence_does_not_depend_on_who_else_is_asked(count):
+    rng = np.random.default_rng(2)
+    index = build_index(np.concatenate([neighbourhood(rng, 400), np.repeat(rng.normal(size=(1, 3)), 120, axis=0)]))
+    surveyed = evidence.survey(index)
+    everywhere = evidence.examine(index, surveyed, index.at(np.arange(len(index))))
+    places = rng.permutation(len(index))[:count]
+    some = evidence.examine(index, surveyed, index.at(places))
+    assert np.array_equal(some.features, everywhere.features[places])
+    assert np.array_equal(some.fit, everywhere.fit[places])
 
 
 @pytest.mark.parametrize("seed", range(4))

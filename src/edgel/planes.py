@@ -98,6 +98,27 @@ def _longer(a, b, c, u, v, w):
 
 
 @part
+def _across(u, v, w):
+    """A unit vector across another one in each lane; of a vector of no length, +Z."""
+    flat_x = (magnitude(u) <= magnitude(v)) & (magnitude(u) <= magnitude(w))
+    flat_y = magnitude(v) <= magnitude(w)
+    zero, tiny = spread(0.0), spread(1e-300)
+    x = where(flat_x, zero, where(flat_y, zero - w, v))
+    y = where(flat_x, w, where(flat_y, zero, zero - u))
+    z = where(flat_x, zero - v, where(flat_y, u, zero))
+    length = root(x * x + y * y + z * z)
+    none = length <= tiny
+    return where(none, zero, x / length), where(none, zero, y / length), where(none, spread(1.0), z / length)
+
+
+@part
+def tangents_of_eight(nx, ny, nz):
+    """Two unit vectors across a unit normal and each other in each lane: `edgel.normals.tangents` in step."""
+    x, y, z = _across(nx, ny, nz)
+    return x, y, z, ny * z - nz * y, nz * x - nx * z, nx * y - ny * x
+
+
+@part
 def smallest_eigenpairs(xx, xy, xz, yy, yz, zz):
     """Smallest and middle eigenvalue of eight positive semidefinite matrices, and unit eigenvectors of the former.
 
@@ -124,14 +145,7 @@ def smallest_eigenpairs(xx, xy, xz, yy, yz, zz):
     a, b, c = xx - smallest, yy - smallest, zz - smallest
     u, v, w = _longer(a, xy, xz, xy, b, yz)
     u, v, w = _longer(u, v, w, xz, yz, c)
-    flat_x = (magnitude(u) <= magnitude(v)) & (magnitude(u) <= magnitude(w))
-    flat_y = magnitude(v) <= magnitude(w)
-    x = where(flat_x, zero, where(flat_y, zero - w, v))
-    y = where(flat_x, w, where(flat_y, zero, zero - u))
-    z = where(flat_x, zero - v, where(flat_y, u, zero))
-    length = root(x * x + y * y + z * z)
-    none = length <= tiny
-    x, y, z = where(none, zero, x / length), where(none, zero, y / length), where(none, spread(1.0), z / length)
+    x, y, z = _across(u, v, w)
     for _ in range(4):
         a, b, c = xx - smallest, yy - smallest, zz - smallest
         # Every column of the adjugate of A - lambda I points along the eigenvector; the longest is the safest.

@@ -11,9 +11,10 @@ import math
 
 import numpy as np
 
-from edgel.evidence.sheets import moments, plane_of
+from edgel.evidence.scales import add_moments
 from edgel.kdtree import NeighborIndex, build_index, node_start
 from edgel.neighbors import visit_neighbors
+from edgel.normals import smallest_eigenpair
 from edgel.parallel import kernel, run_slices
 
 PLANAR = 0.01  # surface variation whose planarity is 1 / e
@@ -59,9 +60,11 @@ def _sum(start, stop, xyz, leaves, sums, planes):
             out[10 + axis] = xyz[axis, first] + middle / count
             for p in range(first, last):
                 vectors[axis, p - first] = xyz[axis, p] - out[10 + axis]
-        moments(vectors, count, 0.0, 0.0, 0.0, -1.0, out)
+        out[:10] = 0.0
+        out[0] = count
+        add_moments(vectors, 0, count, out[1:])
         plane = planes[leaf]
-        left = plane_of(out, plane)
+        left = _plane_of(out, plane)
         plane[6] = left / max(out[4] + out[7] + out[9], 1e-300)
 
 
@@ -81,7 +84,7 @@ def _describe(first, places, squared, queries, query_order, xyz, order, sums, pl
             for i in range(done, count):
                 _add(sums[order[places[q, i]]], sums[leaf], whole)
             done = count
-            left = plane_of(whole, plane)
+            left = _plane_of(whole, plane)
             cx, cy, cz = plane[3], plane[4], plane[5]
             n = whole[0]
             trace = whole[4] + whole[7] + whole[9] - n * (cx * cx + cy * cy + cz * cz)
@@ -101,6 +104,18 @@ def _describe(first, places, squared, queries, query_order, xyz, order, sums, pl
         at = 4 * len(groups)
         out[at], out[at + 1], out[at + 2] = math.log(turn + 1e-6), math.log(unlike + 1e-6), math.log(bent + 1e-6)
         out[at + 3] = sums[leaf, 0]
+
+
+@kernel
+def _plane_of(s, plane):
+    """Fit a plane to points of moments `s` (10,): normal and centroid into `plane` (6,); returns the squares left."""
+    n = s[0]
+    mx, my, mz = s[1] / n, s[2] / n, s[3] / n
+    smallest, _, nx, ny, nz = smallest_eigenpair(
+        s[4] - s[1] * mx, s[5] - s[1] * my, s[6] - s[1] * mz, s[7] - s[2] * my, s[8] - s[2] * mz, s[9] - s[3] * mz
+    )
+    plane[0], plane[1], plane[2], plane[3], plane[4], plane[5] = nx, ny, nz, mx, my, mz
+    return max(smallest, 0.0)
 
 
 @kernel

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from edgel.blocks import aligned
 from edgel.evidence import sectors, sheets, through
 from edgel.evidence.forest import IN_STEP, add_up, chance
 from edgel.evidence.scales import fit_scales, spacing_of
 from edgel.evidence.sectors import sector_gaps
 from edgel.evidence.sheets import fit_sheets
 from edgel.evidence.through import planes_through, span_planes
+from edgel.lanes import LANES
 from edgel.parallel import kernel
 
 
@@ -76,13 +78,12 @@ def examine(
     k = places.shape[1]
     cheap = 6 * len(scales) + 2
     vectors, fitted, found = np.empty((3, k)), np.zeros((len(scales), 4)), np.zeros(cheap)
-    room = np.empty((12, sheets.SHEETS))
-    of_sheets, two, of_votes = np.empty(sheets.NUM_FEATURES), np.empty(sheets.SHEETS), np.empty(through.NUM_FEATURES)
     spanned = np.empty((3, through.PLANES), np.float32)
     off = np.zeros((through.VOTERS, through.PLANES), np.float32)
-    score = np.empty(through.PLANES, np.float32)
+    score, of_votes = np.empty(through.PLANES, np.float32), np.empty(through.NUM_FEATURES)
     gaps, angles = np.zeros(2 * len(counts)), np.empty(k)
     begins, ends = np.empty(sectors.BINS), np.empty(sectors.BINS)
+    _fit_all(first, places, squared, queries, query_order, xyz, normals, fits, cheap + len(cloud), out, planes)
     for q in range(places.shape[0]):
         row, own = query_order[first + q], places[q, 0]
         features = out[row]
@@ -92,13 +93,7 @@ def examine(
         features[:cheap] = found
         at = cheap
         features[at : at + len(cloud)] = cloud
-        at += len(cloud)
-        for f in range(len(fits)):
-            count, scale = min(fits[f, 0], k), fits[f, 1]
-            fit_sheets(vectors, places[q], squared[q], count, spacing, normals[:, scale], room, of_sheets, two)
-            features[at : at + len(of_sheets)] = of_sheets
-            planes[row, f] = two
-            at += len(of_sheets)
+        at += len(cloud) + len(fits) * sheets.NUM_FEATURES
         span_planes(vectors, max(spacing, 1e-300), spanned, off)
         for j in range(len(votes)):
             planes_through(vectors, int(votes[j, 0]), spacing, votes[j, 1], cos_min, spanned, off, score, of_votes)
@@ -106,3 +101,31 @@ def examine(
             at += len(of_votes)
         sector_gaps(vectors, squared[q], normals[own], counts, angles, begins, ends, gaps)
         features[at : at + len(gaps)] = gaps
+
+
+@kernel
+def _fit_all(first, places, squared, queries, query_order, xyz, normals, fits, begin, out, planes):
+    """Fit two planes at each scale, to eight points in step: features into the columns of `out` from `begin` on."""
+    num, k = places.shape
+    vectors, around = aligned(3 * k * LANES).reshape(3, -1), aligned(4 * k * LANES).reshape(4, -1)
+    features, hinges = aligned(sheets.NUM_FEATURES * LANES), aligned(sheets.SHEETS * LANES)
+    room, spacings, own = sheets.make_room(), np.empty(LANES), np.empty(LANES, np.int64)
+    for q in range(0, num, LANES):
+        for lane in range(LANES):
+            own[lane] = min(q + lane, num - 1)  # the last one stands in for those that are missing
+            spacings[lane] = spacing_of(squared[own[lane]])
+            for axis in range(3):
+                for i in range(k):
+                    place = places[own[lane], i]
+                    vectors[axis, i * LANES + lane] = xyz[axis, place] - queries[axis, first + own[lane]]
+        for f in range(len(fits)):
+            count, scale = min(fits[f, 0], k), fits[f, 1]
+            for lane in range(LANES):
+                for i in range(count):
+                    for axis in range(4):
+                        around[axis, i * LANES + lane] = normals[places[own[lane], i], scale, axis]
+            fit_sheets(vectors, around, count, spacings, room, features, hinges)
+            for lane in range(min(LANES, num - q)):
+                row, at = query_order[first + q + lane], begin + f * sheets.NUM_FEATURES
+                out[row, at : at + sheets.NUM_FEATURES] = features[lane::LANES]
+                planes[row, f] = hinges[lane::LANES]

@@ -1,44 +1,50 @@
-"""A quadric over the tangent plane: what a smooth surface would leave of the neighbours."""
+"""A quadric over the tangent plane, for eight points in step: what a smooth surface would leave of the neighbours."""
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from edgel.normals import tangents
-from edgel.parallel import kernel, summing_kernel
+from edgel.evidence.rows import load_row, load_three, store_row, store_rows
+from edgel.lanes import larger, multiply_add, root, spread
+from edgel.parallel import kernel
+from edgel.planes import tangents_of_eight
 
 _STIFF = 1e-4  # on the diagonal, so that what the neighbours leave open is small
 
 
-@summing_kernel
-def _powers(vectors, count, normal, radius, sums):
-    """Sum the powers of x and y up to the fourth over the tangent plane, in radii, and those times z: `sums` (22,)."""
-    nx, ny, nz = normal[0] / radius, normal[1] / radius, normal[2] / radius
-    ux, uy, uz, vx, vy, vz = tangents(normal[0], normal[1], normal[2])
-    ux, uy, uz, vx, vy, vz = ux / radius, uy / radius, uz / radius, vx / radius, vy / radius, vz / radius
+@kernel
+def _add_powers(vectors, count, plane, scale, sums):
+    """Sum the powers of x and y up to the fourth over the tangent plane, those times z, and z squared, in radii.
+
+    Into `sums` (21 rows), from the normal in `plane` (3 rows) and the radius in `scale` (1 row).
+    """
+    per = 1.0 / load_row(scale, 0)
+    nx, ny, nz = load_three(plane, 0)
+    ux, uy, uz, vx, vy, vz = tangents_of_eight(nx, ny, nz)
+    nx, ny, nz = nx * per, ny * per, nz * per
+    ux, uy, uz, vx, vy, vz = ux * per, uy * per, uz * per, vx * per, vy * per, vz * per
     xs, ys, zs = vectors[0], vectors[1], vectors[2]
-    sx, sy, sxx, sxy, syy = 0.0, 0.0, 0.0, 0.0, 0.0
-    sxxx, sxxy, sxyy, syyy = 0.0, 0.0, 0.0, 0.0
-    s40, s31, s22, s13, s04 = 0.0, 0.0, 0.0, 0.0, 0.0
-    sz, sxz, syz, sxxz, sxyz, syyz, szz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    zero = spread(0.0)
+    sx, sy, sxx, sxy, syy, sxxx, sxxy, sxyy, syyy = zero, zero, zero, zero, zero, zero, zero, zero, zero
+    s40, s31, s22, s13, s04 = zero, zero, zero, zero, zero
+    sz, sxz, syz, sxxz, sxyz, syyz, szz = zero, zero, zero, zero, zero, zero, zero
     for i in range(count):
-        a, b, c = xs[i], ys[i], zs[i]
+        a, b, c = load_row(xs, i), load_row(ys, i), load_row(zs, i)
         x, y, z = a * ux + b * uy + c * uz, a * vx + b * vy + c * vz, a * nx + b * ny + c * nz
         xx, xy, yy = x * x, x * y, y * y
         sx, sy, sxx, sxy, syy = sx + x, sy + y, sxx + xx, sxy + xy, syy + yy
-        sxxx, sxxy, sxyy, syyy = sxxx + xx * x, sxxy + xx * y, sxyy + x * yy, syyy + yy * y
-        s40, s31, s22, s13, s04 = s40 + xx * xx, s31 + xx * xy, s22 + xx * yy, s13 + xy * yy, s04 + yy * yy
-        sz, sxz, syz, szz = sz + z, sxz + x * z, syz + y * z, szz + z * z
-        sxxz, sxyz, syyz = sxxz + xx * z, sxyz + xy * z, syyz + yy * z
-    sums[0], sums[1], sums[2], sums[3], sums[4] = sx, sy, sxx, sxy, syy
-    sums[5], sums[6], sums[7], sums[8] = sxxx, sxxy, sxyy, syyy
-    sums[9], sums[10], sums[11], sums[12], sums[13] = s40, s31, s22, s13, s04
-    sums[14], sums[15], sums[16], sums[17], sums[18], sums[19], sums[20] = sz, sxz, syz, sxxz, sxyz, syyz, szz
+        sxxx, sxxy = multiply_add(xx, x, sxxx), multiply_add(xx, y, sxxy)
+        sxyy, syyy = multiply_add(x, yy, sxyy), multiply_add(yy, y, syyy)
+        s40, s31, s22 = multiply_add(xx, xx, s40), multiply_add(xx, xy, s31), multiply_add(xx, yy, s22)
+        s13, s04 = multiply_add(xy, yy, s13), multiply_add(yy, yy, s04)
+        sz, sxz, syz, szz = sz + z, multiply_add(x, z, sxz), multiply_add(y, z, syz), multiply_add(z, z, szz)
+        sxxz, sxyz, syyz = multiply_add(xx, z, sxxz), multiply_add(xy, z, sxyz), multiply_add(yy, z, syyz)
+    store_rows(sums, 0, (sx, sy, sxx, sxy, syy, sxxx, sxxy, sxyy, syyy))
+    store_rows(sums, 9, (s40, s31, s22, s13, s04))
+    store_rows(sums, 14, (sz, sxz, syz, sxxz, sxyz, syyz, szz))
 
 
-_POWER = np.array(  # which power of `_powers` a product of two of the terms 1, x, y, xx, xy, yy is; -1: the count
+_POWER = np.array(  # which power of `_add_powers` a product of two of the terms 1, x, y, xx, xy, yy is; -1: the count
     [
         [-1, 0, 1, 2, 3, 4, 14],
         [0, 2, 3, 5, 6, 7, 15],
@@ -51,33 +57,37 @@ _POWER = np.array(  # which power of `_powers` a product of two of the terms 1, 
 
 
 @kernel
-def fit_quadric(vectors, count, normal, radius, quadric):
-    """Fit z = f0 + f1 x + f2 y + f3 x^2 + f4 x y + f5 y^2 over the tangent plane; returns the squares left.
+def fit_quadric(vectors, count, plane, scale, room, bent):
+    """Fit z = f0 + f1 x + f2 y + f3 x^2 + f4 x y + f5 y^2 over the tangent plane, by Cholesky of the normal equations.
 
-    Lengths in radii: `quadric` (6,) too. The normal equations, solved by Cholesky.
+    Writes f3, f4, f5, in radii, and the squares left to `bent` (4 rows); `room` is (2, 42 rows).
     """
-    sums, m = np.empty(22), np.empty((6, 7))
-    _powers(vectors, count, normal, radius, sums)
+    sums, m = room[0], room[1]
+    _add_powers(vectors, count, plane, scale, sums)
     for i in range(6):
         for j in range(i, 7):
-            m[i, j] = float(count) if _POWER[i, j] < 0 else sums[_POWER[i, j]]
-        m[i, i] += _STIFF
-    dot = 0.0
+            power = _POWER[i, j]
+            store_row(m, 7 * i + j, spread(float(count)) if power < 0 else load_row(sums, power))
+        store_row(m, 8 * i, load_row(m, 8 * i) + _STIFF)
+    left = load_row(sums, 20)
     for i in range(6):
-        pivot = m[i, i]
+        pivot = load_row(m, 8 * i)
         for k in range(i):
-            pivot -= m[k, i] * m[k, i]
-        pivot = math.sqrt(max(pivot, 1e-12))
-        m[i, i] = pivot
+            above = load_row(m, 7 * k + i)
+            pivot = pivot - above * above
+        pivot = root(larger(pivot, 1e-12))
+        store_row(m, 8 * i, pivot)
         for j in range(i + 1, 7):
-            value = m[i, j]
+            value = load_row(m, 7 * i + j)
             for k in range(i):
-                value -= m[k, i] * m[k, j]
-            m[i, j] = value / pivot
-        dot += m[i, 6] * m[i, 6]
-    for i in range(5, -1, -1):
-        value = m[i, 6]
+                value = value - load_row(m, 7 * k + i) * load_row(m, 7 * k + j)
+            store_row(m, 7 * i + j, value / pivot)
+        last = load_row(m, 7 * i + 6)
+        left = left - last * last
+    for i in range(5, 2, -1):
+        value = load_row(m, 7 * i + 6)
         for j in range(i + 1, 6):
-            value -= m[i, j] * quadric[j]
-        quadric[i] = value / m[i, i]
-    return max(sums[20] - dot, 0.0) * radius * radius
+            value = value - load_row(m, 7 * i + j) * load_row(bent, j - 3)
+        store_row(bent, i - 3, value / load_row(m, 8 * i))
+    radius = load_row(scale, 0)
+    store_row(bent, 3, larger(left, 0.0) * radius * radius)

@@ -21,7 +21,7 @@ def spacing_of(squared):
 
 
 @summing_kernel
-def _add_moments(vectors, start, stop, sums):
+def add_moments(vectors, start, stop, sums):
     """Add x, y, z, xx, xy, xz, yy, yz, zz of the neighbours start..stop-1 to `sums` (9,)."""
     xs, ys, zs = vectors[0], vectors[1], vectors[2]
     mx, my, mz = 0.0, 0.0, 0.0
@@ -54,7 +54,7 @@ def fit_scales(vectors, squared, scales, normals, features):
     done = 0
     for s in range(len(scales)):
         k = min(scales[s], vectors.shape[1])
-        _add_moments(vectors, done, k, sums)
+        add_moments(vectors, done, k, sums)
         done = k
         cx, cy, cz = sums[0] / k, sums[1] / k, sums[2] / k
         axx, axy, axz = sums[3] / k - cx * cx, sums[4] / k - cx * cy, sums[5] / k - cx * cz

@@ -1,6 +1,6 @@
-"""Two planes that meet in a line, fitted to the neighbours at one scale: a hinge of any angle.
+"""What two planes that meet make of the neighbours at one scale, for eight points in step.
 
-Neighbours on either side of the plane that bisects the two belong to one each, so that noise can't part them.
+One point after the other, nearly all the time went into scalar eigenvectors; in step a fit takes a fifth of it.
 """
 
 from __future__ import annotations
@@ -9,250 +9,229 @@ import math
 
 import numpy as np
 
+from edgel.blocks import aligned
+from edgel.evidence.hinge import add_moments, bisect, fit_plane, refine
 from edgel.evidence.quadric import fit_quadric
-from edgel.normals import smallest_eigenpair, tangents
-from edgel.parallel import kernel, summing_kernel
+from edgel.evidence.rows import keep_rows, load_row, load_three, store_row, store_rows
+from edgel.lanes import LANES, larger, magnitude, root, smaller, spread, where
+from edgel.parallel import kernel, part
+from edgel.planes import tangents_of_eight
 
-ROUNDS = 3
 NUM_FEATURES = 13
 SHEETS = 24  # numbers that describe two planes: see `fit_sheets`
 _MARGIN_NEIGHBORS = 16
 
 
-@summing_kernel
-def moments(vectors, count, px, py, pz, level, sums):
-    """Sum 1, x, y, z, xx, xy, xz, yy, yz, zz over the neighbours beyond a plane into `sums` (10,)."""
-    xs, ys, zs = vectors[0], vectors[1], vectors[2]
-    n, mx, my, mz = 0.0, 0.0, 0.0, 0.0
-    xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(count):
-        x, y, z = xs[i], ys[i], zs[i]
-        w = 1.0 if px * x + py * y + pz * z > level else 0.0
-        n, mx, my, mz = n + w, mx + w * x, my + w * y, mz + w * z
-        xx, xy, xz = xx + w * x * x, xy + w * x * y, xz + w * x * z
-        yy, yz, zz = yy + w * y * y, yz + w * y * z, zz + w * z * z
-    sums[0], sums[1], sums[2], sums[3], sums[4] = n, mx, my, mz, xx
-    sums[5], sums[6], sums[7], sums[8], sums[9] = xy, xz, yy, yz, zz
+@kernel
+def make_room():
+    """Room for `fit_sheets`: (16, 42 rows)."""
+    return aligned(16 * 42 * LANES).reshape(16, -1)
 
 
 @kernel
-def plane_of(s, plane):
-    """Fit a plane to points of moments `s` (10,): normal and centroid into `plane` (6,); returns the squares left."""
-    n = s[0]
-    mx, my, mz = s[1] / n, s[2] / n, s[3] / n
-    smallest, _, nx, ny, nz = smallest_eigenpair(
-        s[4] - s[1] * mx, s[5] - s[1] * my, s[6] - s[1] * mz, s[7] - s[2] * my, s[8] - s[2] * mz, s[9] - s[3] * mz
+def _measure(vectors, count, spacings, scale):
+    """Write radius, spacing, and whether both are above 0, 1 where not, to `scale` (3 rows)."""
+    x, y, z = load_row(vectors[0], count - 1), load_row(vectors[1], count - 1), load_row(vectors[2], count - 1)
+    radius, spacing = root(x * x + y * y + z * z), load_row(spacings, 0)
+    scattered = (radius > 0.0) & (spacing > 0.0)
+    store_rows(
+        scale, 0, (where(scattered, radius, 1.0), where(scattered, spacing, 1.0), where(scattered, spread(1.0), 0.0))
     )
-    plane[0], plane[1], plane[2], plane[3], plane[4], plane[5] = nx, ny, nz, mx, my, mz
-    return max(smallest, 0.0)
 
 
 @kernel
-def _bisect(a, b, line):
-    """Find where planes a and b (6,) meet, and the plane that parts their centroids; false where they are parallel.
-
-    Writes to `line` (10,): the line's direction, its point nearest to the origin, and the parting plane's normal and
-    level.
-    """
-    dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-    tx, ty, tz = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-    sine2 = tx * tx + ty * ty + tz * tz
-    if sine2 < 1e-4:
-        return False
-    da = a[0] * a[3] + a[1] * a[4] + a[2] * a[5]
-    db = b[0] * b[3] + b[1] * b[4] + b[2] * b[5]
-    u, v = (da - db * dot) / sine2, (db - da * dot) / sine2
-    fx, fy, fz = u * a[0] + v * b[0], u * a[1] + v * b[1], u * a[2] + v * b[2]
-    length = math.sqrt(sine2)
-    line[0], line[1], line[2] = tx / length, ty / length, tz / length
-    line[3], line[4], line[5] = fx, fy, fz
-    # Of the two bisecting planes, the one that parts the centroids.
-    px, py, pz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
-    qx, qy, qz = a[0] + b[0], a[1] + b[1], a[2] + b[2]
-    cx, cy, cz = a[3] - b[3], a[4] - b[4], a[5] - b[5]
-    p, q = px * cx + py * cy + pz * cz, qx * cx + qy * cy + qz * cz
-    if p * p * (qx * qx + qy * qy + qz * qz) < q * q * (px * px + py * py + pz * pz):
-        px, py, pz, p = qx, qy, qz, q
-    if p < 0.0:
-        px, py, pz = -px, -py, -pz
-    line[6], line[7], line[8], line[9] = px, py, pz, px * fx + py * fy + pz * fz
-    return True
+def _across_bend(plane, quadric, start):
+    """Put the plane through the point across the direction in which the quadric bends most into `start`."""
+    ux, uy, uz, vx, vy, vz = tangents_of_eight(*load_three(plane, 0))
+    xx, xy, yy = load_three(quadric, 0)
+    # The direction of the larger eigenvalue halves the angle between (xx - yy, xy) and (1, 0).
+    difference = xx - yy
+    size = root(difference * difference + xy * xy)
+    flat, steep = size + magnitude(difference), magnitude(xy)
+    c, s = where(difference < 0.0, steep, flat), where(difference < 0.0, flat, steep)
+    length = root(c * c + s * s)
+    c, s = where(length > 0.0, c / length, 1.0), where(length > 0.0, s / length, 0.0)
+    s = where(xy < 0.0, 0.0 - s, s)
+    other = xx + yy < 0.0  # the smaller eigenvalue is farther from zero
+    c, s = where(other, 0.0 - s, c), where(other, c, s)
+    store_rows(start, 0, (c * ux + s * vx, c * uy + s * vy, c * uz + s * vz, spread(0.0)))
 
 
-@kernel
-def _refine(vectors, count, whole, start, sheets, room):
-    """Part by a plane `start` (4,), fit, part again; returns the squares left, infinite where a side is too small.
-
-    `whole` (10,) are the moments of all; `room` is (5, 10).
-    """
-    one, other, a, b, line = room[0], room[1], room[2], room[3], room[4]
-    px, py, pz, level = start[0], start[1], start[2], start[3]
-    best = np.inf
-    for _turn in range(ROUNDS):
-        moments(vectors, count, px, py, pz, level, one)
-        for i in range(10):
-            other[i] = whole[i] - one[i]
-        if one[0] < 4.0 or other[0] < 4.0:
-            break
-        left = plane_of(one, a) + plane_of(other, b)
-        if not left < best or not _bisect(a, b, line):
-            break
-        settled = left > 0.999 * best
-        best = left
-        sheets[0:3], sheets[3:6] = a[0:3], b[0:3]
-        sheets[6:12] = line[0:6]
-        sheets[12], sheets[13] = one[0], other[0]
-        sheets[14:17], sheets[17:20] = a[3:6], b[3:6]
-        sheets[20:24] = line[6:10]
-        if settled:
-            break
-        px, py, pz, level = line[6], line[7], line[8], line[9]
-    return best
-
-
-@kernel
-def _across_bend(normal, quadric, start):
-    """Put the plane through the point across the direction in which the quadric bends most into `start` (4,)."""
-    nx, ny, nz = normal[0], normal[1], normal[2]
-    ux, uy, uz, vx, vy, vz = tangents(nx, ny, nz)
-    angle = 0.5 * math.atan2(quadric[4], quadric[3] - quadric[5])
-    c, s = math.cos(angle), math.sin(angle)
-    along = quadric[3] * c * c + quadric[4] * c * s + quadric[5] * s * s
-    across = quadric[3] * s * s - quadric[4] * c * s + quadric[5] * c * c
-    if abs(across) > abs(along):
-        c, s = -s, c
-    start[0], start[1], start[2], start[3] = c * ux + s * vx, c * uy + s * vy, c * uz + s * vz, 0.0
-
-
-@kernel
-def _most_different(places, squared, count, normals):
-    """Choose the two neighbours whose planes differ most, near and flat ones first; -1 where all are alike."""
-    reach2 = squared[count - 1]
-    a, best = 0, -1.0
-    for i in range(count):
-        score = normals[places[i], 3] * _nearness(2.0 * squared[i] / reach2)
-        if score > best:
-            a, best = i, score
-    ax, ay, az = normals[places[a], 0], normals[places[a], 1], normals[places[a], 2]
-    b, best = -1, 1e-6
-    for i in range(count):
-        p = places[i]
-        cosine = abs(normals[p, 0] * ax + normals[p, 1] * ay + normals[p, 2] * az)
-        score = normals[p, 3] * (1.0 - cosine) * _nearness(squared[i] / reach2)
-        if score > best:
-            b, best = i, score
-    return a, b
-
-
-@kernel
+@part
 def _nearness(far2):
     """Fall off like a Gaussian of the distance: 1, 0.4, 0.14 at squares 0, 1, 2."""
-    return 1.0 / (1.0 + far2 * (1.0 + 0.5 * far2 * (1.0 + far2 / 3.0)))
+    return 1.0 / (1.0 + far2 * (1.0 + 0.5 * far2 * (1.0 + far2 * (1.0 / 3.0))))
 
 
 @kernel
-def _of_neighbor(normals, place, vectors, i, plane):
-    for axis in range(3):
-        plane[axis], plane[3 + axis] = normals[place, axis], vectors[axis, i]
+def _most_different(vectors, normals, count, scale, a, b):
+    """Choose the planes of the two neighbours whose planes differ most, near and flat ones first.
 
-
-@summing_kernel
-def _reaches(vectors, count, sheets, near):
-    """How near the line those on either side come, squared, how far they reach, and how far along it: `near` (6,)."""
-    tx, ty, tz, fx, fy, fz = sheets[6], sheets[7], sheets[8], sheets[9], sheets[10], sheets[11]
-    px, py, pz, level = sheets[20], sheets[21], sheets[22], sheets[23]
+    `b` becomes `a` where all are alike. Writes normals and places to `a` and `b`.
+    """
     xs, ys, zs = vectors[0], vectors[1], vectors[2]
-    near_a, near_b, far_a, far_b, low, high = 1e300, 1e300, 0.0, 0.0, 0.0, 0.0
-    beside2 = near[0]
+    us, vs, ws, flatness = normals[0], normals[1], normals[2], normals[3]
+    shrink = 1.0 / load_row(scale, 0)
+    shrink = shrink * shrink
+    zero, best = spread(0.0), spread(-1.0)
+    au, av, aw, ax, ay, az = zero, zero, zero, zero, zero, zero
     for i in range(count):
-        x, y, z = xs[i], ys[i], zs[i]
+        x, y, z = load_row(xs, i), load_row(ys, i), load_row(zs, i)
+        score = load_row(flatness, i) * _nearness(2.0 * (x * x + y * y + z * z) * shrink)
+        better = score > best
+        best, ax, ay, az = where(better, score, best), where(better, x, ax), where(better, y, ay), where(better, z, az)
+        au, av = where(better, load_row(us, i), au), where(better, load_row(vs, i), av)
+        aw = where(better, load_row(ws, i), aw)
+    best, bu, bv, bw, bx, by, bz = spread(1e-6), au, av, aw, ax, ay, az
+    for i in range(count):
+        x, y, z = load_row(xs, i), load_row(ys, i), load_row(zs, i)
+        u, v, w = load_row(us, i), load_row(vs, i), load_row(ws, i)
+        turn = 1.0 - magnitude(u * au + v * av + w * aw)
+        score = load_row(flatness, i) * turn * _nearness((x * x + y * y + z * z) * shrink)
+        better = score > best
+        best, bx, by, bz = where(better, score, best), where(better, x, bx), where(better, y, by), where(better, z, bz)
+        bu, bv, bw = where(better, u, bu), where(better, v, bv), where(better, w, bw)
+    store_rows(a, 0, (au, av, aw, ax, ay, az))
+    store_rows(b, 0, (bu, bv, bw, bx, by, bz))
+
+
+@part
+def _reaches(vectors, count, spacing, hinge):
+    """How near the line both sides come, squared, how far both reach, squared, and how far both ways along it."""
+    tx, ty, tz = load_three(hinge, 6)
+    fx, fy, fz = load_three(hinge, 9)
+    px, py, pz = load_three(hinge, 20)
+    level, beside2 = load_row(hinge, 23), 2.25 * spacing * spacing
+    xs, ys, zs = vectors[0], vectors[1], vectors[2]
+    zero, far = spread(0.0), spread(1e300)
+    near_a, near_b, far_a, far_b, low, high = far, far, zero, zero, zero, zero
+    for i in range(count):
+        x, y, z = load_row(xs, i), load_row(ys, i), load_row(zs, i)
         dx, dy, dz = x - fx, y - fy, z - fz
         along = dx * tx + dy * ty + dz * tz
-        across2 = dx * dx + dy * dy + dz * dz - along * along
-        across2 = across2 if across2 > 0.0 else 0.0
+        across2 = larger(dx * dx + dy * dy + dz * dz - along * along, zero)
         first = px * x + py * y + pz * z > level
-        own, other = across2 if first else 1e300, 1e300 if first else across2
-        near_a, near_b = own if own < near_a else near_a, other if other < near_b else near_b
-        own, other = across2 if first else 0.0, 0.0 if first else across2
-        far_a, far_b = own if own > far_a else far_a, other if other > far_b else far_b
-        along = along if across2 < beside2 else 0.0
-        low, high = along if along < low else low, along if along > high else high
-    near[0], near[1], near[2], near[3], near[4], near[5] = near_a, near_b, far_a, far_b, low, high
+        near_a, near_b = smaller(near_a, where(first, across2, far)), smaller(near_b, where(first, far, across2))
+        far_a, far_b = larger(far_a, where(first, across2, zero)), larger(far_b, where(first, zero, across2))
+        along = where(across2 < beside2, along, zero)
+        low, high = smaller(low, along), larger(high, along)
+    return larger(near_a, near_b), smaller(far_a, far_b), smaller(zero - low, high)
 
 
-@kernel
-def _margin(vectors, count, spacing, sheets):
-    """Least difference, over stretches of the line, of the point's distance and that of the nearest other, in spacings.
+@part
+def _margin(vectors, count, spacing, hinge):
+    """Least difference, over stretches of the line, of the point's distance and that of the nearest other.
 
     Below zero a stretch of the line runs through the point's own cell.
     """
-    margin = 2.0
+    tx, ty, tz = load_three(hinge, 6)
+    fx, fy, fz = load_three(hinge, 9)
+    xs, ys, zs = vectors[0], vectors[1], vectors[2]
+    margin = spread(np.inf)
     for step in range(-2, 3):
         shift = 0.3 * step * spacing
-        x, y, z = sheets[9] + shift * sheets[6], sheets[10] + shift * sheets[7], sheets[11] + shift * sheets[8]
-        nearest = np.inf
+        x, y, z = fx + shift * tx, fy + shift * ty, fz + shift * tz
+        nearest = spread(np.inf)
         for i in range(1, min(count, _MARGIN_NEIGHBORS)):
-            dx, dy, dz = vectors[0, i] - x, vectors[1, i] - y, vectors[2, i] - z
-            nearest = min(nearest, dx * dx + dy * dy + dz * dz)
-        margin = min(margin, (math.sqrt(x * x + y * y + z * z) - math.sqrt(nearest)) / spacing)
+            dx, dy, dz = load_row(xs, i) - x, load_row(ys, i) - y, load_row(zs, i) - z
+            nearest = smaller(nearest, dx * dx + dy * dy + dz * dz)
+        margin = smaller(margin, root(x * x + y * y + z * z) - root(nearest))
     return margin
 
 
 @kernel
-def fit_sheets(vectors, places, squared, count, spacing, normals, room, features, sheets):
-    """Fit two planes to the `count` nearest neighbours, and describe how well that explains them.
+def _describe(vectors, count, scale, plane, bent, two, hinge, features):
+    """Write what `fit_sheets` says of the fits, before logarithms are taken; erase the hinges that are none."""
+    radius, spacing, scattered = load_three(scale, 0)
+    found = (scattered > 0.0) & (load_row(two, 0) < np.inf)
+    for i in range(SHEETS):
+        store_row(hinge, i, where(found, load_row(hinge, i), 0.0))
+    ax, ay, az = load_three(hinge, 0)
+    bx, by, bz = load_three(hinge, 3)
+    fx, fy, fz = load_three(hinge, 9)
+    per, share = 1.0 / spacing, 1.0 / count
+    one, smooth = root(load_row(plane, 6) * share) * per, root(load_row(bent, 3) * share) * per
+    both = where(found, root(load_row(two, 0) * share) * per, one)
+    cosine = where(found, smaller(magnitude(ax * bx + ay * by + az * bz), 1.0), 1.0)
+    fewer = smaller(load_row(hinge, 12), load_row(hinge, 13)) * share
+    store_rows(features, 0, (one + 0.01, smooth + 0.01, both + 0.01, cosine, fewer))
+    away = where(found, root(fx * fx + fy * fy + fz * fz) * per, 4.0)
+    off_a = where(found, magnitude(ax * fx + ay * fy + az * fz) * per, 4.0)
+    off_b = where(found, magnitude(bx * fx + by * fy + bz * fz) * per, 4.0)
+    store_rows(features, 5, (smaller(away, 4.0), smaller(off_a, 4.0), smaller(off_b, 4.0)))
+    near2, far2, along = _reaches(vectors, count, spacing, hinge)
+    near, far, along = smaller(root(near2) * per, 4.0), root(far2) / radius, along / radius
+    store_rows(features, 8, (where(found, near, 0.0), where(found, far, 0.0), where(found, along, 0.0)))
+    margin = smaller(_margin(vectors, count, spacing, hinge) * per, 2.0)
+    store_rows(features, 11, (where(away < 3.0, margin, 2.0), where(found, 1.0, spread(0.0))))
 
-    Parameters: the neighbours (3, k) relative to the point, nearest first, their places and squared distances; the
-    spacing; the planes fitted at each sorted point (N, 4) at a smaller scale; room (12, 24). Writes `features` (13,)
-    and `sheets` (24,): both normals, the line's direction and its point nearest to the query, the number of neighbours
-    of either and their centroids, and the plane (normal and level) that parts them.
+
+@kernel
+def _take_logarithms(features, scale):
+    """Finish what `_describe` wrote lane by lane: there are no logarithms and no arccos in step."""
+    for lane in range(LANES):
+        for i in range(3):
+            features[i * LANES + lane] = math.log(features[i * LANES + lane])
+        features[3 * LANES + lane] = math.acos(features[3 * LANES + lane])
+        features[12 * LANES + lane] *= features[2 * LANES + lane] - features[LANES + lane]
+        for i in range(NUM_FEATURES):
+            features[i * LANES + lane] *= scale[2 * LANES + lane]
+
+
+@kernel
+def fit_sheets(vectors, normals, count, spacings, room, features, hinges):
+    """Fit two planes to the `count` nearest neighbours of eight points, and describe how well that explains them.
+
+    No lane depends on what is in the others.
+
+    Parameters
+    ----------
+    vectors : (3, K rows) float64
+        Neighbours relative to the points, nearest first: see `edgel.evidence.rows`.
+    normals : (4, count rows) float64
+        Normals and planarity of the planes fitted at the neighbours at a smaller scale.
+    count : int
+        At most K.
+    spacings : (1 row) float64
+    room
+        What `make_room` made.
+    features : (13 rows) float64
+        Written: logarithms of what one plane, a quadric and two planes leave, in spacings; the angle between the two;
+        the share of the smaller side; how far from the point their line is, and each plane at its foot; how near to
+        the line both sides come; how far both reach, and the line both ways, in radii; the margin by which all of the
+        line lies outside the point's own cell; how much less than two planes a quadric leaves. Zero where all are at
+        one place.
+    hinges : (24 rows) float64
+        Written: both normals, the line's direction and its point nearest to the query, the number of neighbours of
+        either and their centroids, and the plane (normal and level) that parts them. Zero where there are none.
     """
-    features[:] = 0.0
-    sheets[:] = 0.0
-    radius = math.sqrt(squared[count - 1])
-    if radius == 0.0 or spacing == 0.0:
-        return
-    whole, plane, quadric, start, fits = room[0, :10], room[1, :6], room[2], room[3, :4], room[4:9, :10]
+    whole, plane, bent, start, a, b, line, second = (
+        room[0],
+        room[1],
+        room[2],
+        room[3],
+        room[4],
+        room[5],
+        room[6],
+        room[7],
+    )
+    two, other, scale, rest = room[8], room[9], room[10], room[11:]
+    _measure(vectors, count, spacings, scale)
     # The one plane and the quadric: what a smooth surface would leave.
-    moments(vectors, count, 0.0, 0.0, 0.0, -1.0, whole)
-    one = plane_of(whole, plane)
-    bent = fit_quadric(vectors, count, plane, radius, quadric)
-    _across_bend(plane, quadric, start)
-    two = _refine(vectors, count, whole, start, sheets, fits)
-    i, j = _most_different(places, squared, count, normals)
-    if j >= 0:
-        a, b, line, second = room[9], room[10], room[11, :10], room[1]
-        _of_neighbor(normals, places[i], vectors, i, a)
-        _of_neighbor(normals, places[j], vectors, j, b)
-        if _bisect(a, b, line):
-            start[0], start[1], start[2], start[3] = line[6], line[7], line[8], line[9]
-            other = _refine(vectors, count, whole, start, second, fits)
-            if other < two:
-                two = other
-                sheets[:] = second
-    rms_one, rms_bent = math.sqrt(one / count) / spacing, math.sqrt(bent / count) / spacing
-    features[0] = math.log(rms_one + 0.01)
-    features[1] = math.log(rms_bent + 0.01)
-    if not two < np.inf:
-        features[2] = features[0]
-        features[5:8] = 4.0
-        features[11] = 2.0
-        return
-    rms_two = math.sqrt(two / count) / spacing
-    features[2] = math.log(rms_two + 0.01)
-    cosine = abs(sheets[0] * sheets[3] + sheets[1] * sheets[4] + sheets[2] * sheets[5])
-    features[3] = math.acos(min(cosine, 1.0))
-    features[4] = min(sheets[12], sheets[13]) / count
-    fx, fy, fz = sheets[9], sheets[10], sheets[11]
-    away = math.sqrt(fx * fx + fy * fy + fz * fz) / spacing
-    features[5] = min(away, 4.0)
-    features[6] = min(abs(sheets[0] * fx + sheets[1] * fy + sheets[2] * fz) / spacing, 4.0)
-    features[7] = min(abs(sheets[3] * fx + sheets[4] * fy + sheets[5] * fz) / spacing, 4.0)
-    near = room[3]
-    near[0] = 2.25 * spacing * spacing
-    _reaches(vectors, count, sheets, near)
-    features[8] = min(math.sqrt(max(near[0], near[1])) / spacing, 4.0)
-    features[9] = math.sqrt(min(near[2], near[3])) / radius
-    features[10] = min(-near[4], near[5]) / radius
-    features[11] = min(_margin(vectors, count, spacing, sheets), 2.0) if away < 3.0 else 2.0
-    features[12] = math.log((rms_two + 0.01) / (rms_bent + 0.01))
+    store_rows(start, 0, (spread(0.0), spread(0.0), spread(0.0), spread(-1.0)))  # all are beyond it
+    add_moments(vectors, count, start, whole)
+    fit_plane(whole, plane)
+    fit_quadric(vectors, count, plane, scale, rest, bent)
+    # Two planes, parted at first where the quadric bends most, or between the neighbours that differ most.
+    _across_bend(plane, bent, start)
+    refine(vectors, count, whole, start, rest, hinges, two)
+    _most_different(vectors, normals, count, scale, a, b)
+    bisect(a, b, line)
+    refine(vectors, count, whole, line[6 * LANES :], rest, second, other)
+    # Often both come to the same hinge, its sides swapped: rounding must not choose.
+    radius, first_left, second_left = load_row(scale, 0), load_row(two, 0), load_row(other, 0)
+    less = second_left < first_left - 1e-12 * count * radius * radius
+    keep_rows(less, second, 0, hinges, 0, SHEETS)
+    store_row(two, 0, where(less, second_left, first_left))
+    _describe(vectors, count, scale, plane, bent, two, hinges, features)
+    _take_logarithms(features, scale)
