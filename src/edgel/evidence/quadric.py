@@ -68,7 +68,8 @@ def fit_quadric(vectors, count, plane, scale, room, bent):
         for j in range(i, 7):
             power = _POWER[i, j]
             store_row(m, 7 * i + j, spread(float(count)) if power < 0 else load_row(sums, power))
-        store_row(m, 8 * i, load_row(m, 8 * i) + _STIFF)
+        # Half of it for x y, which the form holds twice: else the fit would depend on where x points.
+        store_row(m, 8 * i, load_row(m, 8 * i) + (0.5 * _STIFF if i == 4 else _STIFF))
     left = load_row(sums, 20)
     for i in range(6):
         pivot = load_row(m, 8 * i)

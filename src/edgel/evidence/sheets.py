@@ -40,8 +40,11 @@ def _measure(vectors, count, spacings, scale):
 
 
 @kernel
-def _across_bend(plane, quadric, start):
-    """Put the plane through the point across the direction in which the quadric bends most into `start`."""
+def _across_bend(plane, quadric, whole, start):
+    """Put the plane through the point across the direction in which the quadric bends most into `start`.
+
+    The centroid lies beyond it, the point itself does not: which way the direction points must not matter.
+    """
     ux, uy, uz, vx, vy, vz = tangents_of_eight(*load_three(plane, 0))
     xx, xy, yy = load_three(quadric, 0)
     # The direction of the larger eigenvalue halves the angle between (xx - yy, xy) and (1, 0).
@@ -54,7 +57,10 @@ def _across_bend(plane, quadric, start):
     s = where(xy < 0.0, 0.0 - s, s)
     other = xx + yy < 0.0  # the smaller eigenvalue is farther from zero
     c, s = where(other, 0.0 - s, c), where(other, c, s)
-    store_rows(start, 0, (c * ux + s * vx, c * uy + s * vy, c * uz + s * vz, spread(0.0)))
+    x, y, z = c * ux + s * vx, c * uy + s * vy, c * uz + s * vz
+    mx, my, mz = load_three(whole, 1)
+    sign = where(x * mx + y * my + z * mz < 0.0, -1.0, 1.0)
+    store_rows(start, 0, (sign * x, sign * y, sign * z, spread(0.0)))
 
 
 @part
@@ -223,7 +229,7 @@ def fit_sheets(vectors, normals, count, spacings, room, features, hinges):
     fit_plane(whole, plane)
     fit_quadric(vectors, count, plane, scale, rest, bent)
     # Two planes, parted at first where the quadric bends most, or between the neighbours that differ most.
-    _across_bend(plane, bent, start)
+    _across_bend(plane, bent, whole, start)
     refine(vectors, count, whole, start, rest, hinges, two)
     _most_different(vectors, normals, count, scale, a, b)
     bisect(a, b, line)
