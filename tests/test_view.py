@@ -264,7 +264,7 @@ def test_large_clouds_are_drawn_thinned_and_searched_whole(open_session, hall_fi
     session = open_session([hall_file])
     assert session.wait_idle(TIMEOUT)
     (pane,) = session.panes()
-    assert pane.source.is_thinned
+    assert not pane.source.drawn(Settings(every_point=True)).whole
     assert len(pane.source.shown) == 1000
     assert pane.source.normals is not None
     assert pane.source.normals.shape == (1000, 3)
@@ -568,10 +568,10 @@ def test_colors_are_offered_where_the_file_has_them(open_session, tmp_path):
     rgb, plain = session.sources
     assert set(colorings(rgb)) == set(Coloring)
     assert set(colorings(plain)) == {Coloring.GREY, Coloring.HEIGHT, Coloring.NORMALS}
-    own = cloud_colors(rgb, Coloring.OWN, np.eye(3))
+    own = cloud_colors(rgb, rgb.few, Coloring.OWN, np.eye(3))
     np.testing.assert_allclose(own, np.column_stack(list(color.values())), atol=1)
     for coloring in Coloring:
-        drawn = cloud_colors(rgb, coloring, np.eye(3))
+        drawn = cloud_colors(rgb, rgb.few, coloring, np.eye(3))
         assert drawn.shape == xyz.shape
         assert drawn.dtype == np.uint8
         assert drawn.std() > 5

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from edgel.view.pick import describe, pick
 from edgel.view.save import edges_file, picture_file, png
 from edgel.view.session import Pane, Session
 
+_HEAD_START = 0.005  # seconds in which the texts leave before the scene
 _CLICK = 8  # pixels that a click may miss an edge point by
 
 
@@ -31,7 +33,7 @@ class Page:
     """
 
     def __init__(self, server: viser.ViserServer, session: Session) -> None:
-        self._session = session
+        self._server, self._session = server, session
         self._lock = threading.Lock()
         self._images: dict[str, PaperEdges] = {}
         self._panes: list[Pane] = []
@@ -75,13 +77,17 @@ class Page:
             controls.offer(sources, [coloring for source in sources for coloring in colorings(source)])
         controls.fit_method(settings)
         pane = controls.choose_pane(panes)
+        controls.status.content = texts.status(session, panes, settings)
+        controls.legend.content = texts.legend(panes, settings)
+        # The browser shows texts at once; those in one message with the scene would wait for a frame to be drawn.
+        self._server.flush()
+        time.sleep(_HEAD_START)
         self._canvas.draw(panes, settings)
+        self._server.flush()
         if any(new.edges is not old.edges for new, old in zip(panes, self._panes, strict=False)):
             self._canvas.mark(None)
         self._panes = panes
         self._show_images(panes)
-        controls.status.content = texts.status(session, panes, settings)
-        controls.legend.content = texts.legend(panes, settings)
         lines = (
             {}
             if pane is None
