@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import viser
 
+from edgel.detect import LIKELY
 from edgel.edges import Edges
 from edgel.view.colors import cloud_colors, edge_colors
 from edgel.view.layout import FIELD_OF_VIEW, Layout, Place, lay_out
@@ -20,6 +21,7 @@ from edgel.view.source import Drawn
 _POINT = 1.5  # side of a point of the cloud, a square, in spacings: no holes, and little drawn twice
 _EDGE = 1.0  # side of an edge point, in those of the cloud
 _RISE = 0.35  # sides of a point by which edge points stand out of the surface, whose points would hide them
+_LOW_RISE = 0.2  # the same for unlikely ones, so that they hide no likely ones
 _LEAST_EDGE = 0.01  # scene units: three pixels on a usual screen
 _SPARSE = 0.01  # scene units: points that lie far from each other for the most part are seen at that size
 _NOTHING = np.zeros((1, 3), np.float32), np.zeros((1, 3), np.uint8)
@@ -128,7 +130,8 @@ class Canvas:
                 segments["normals"] = _normals(edges.take(rows), points[rows], place)
         drawn = points
         if edges is not None:
-            lift = (_RISE * side * _outwards(edges, place)).astype(np.float32)
+            rise = np.where((edges.strength < LIKELY) & (edges.preset == "default"), _LOW_RISE, _RISE)
+            lift = (rise[:, None] * side * _outwards(edges, place)).astype(np.float32)
             drawn, colors = np.concatenate([points + lift, points - lift]), np.concatenate([colors, colors])
         self._points(name, drawn, colors, settings.size * max(_EDGE * side, _LEAST_EDGE))
         for what in ("tangents", "normals"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from edgel.color.channels import color_channels, intensity_of, rgb_of
+from edgel.detect import LIKELY
 from edgel.edges import EdgeKind, Edges
 from edgel.palette import height_colors, kind_colors, muted, ramp_colors
 from edgel.view.settings import Coloring
@@ -23,6 +24,7 @@ _LIGHT = np.array([-0.35, -0.45, 0.82])  # towards the light, in the scene: from
 _GREYS = (105.0, 232.0)
 _INTENSITY_GREYS = (20.0, 245.0)
 _FLAT_GREY = 180
+_PALE_GREY, _PALEST = 225, 0.8  # what the least likely edge points fade into, and how far
 
 
 def colorings(source: Source) -> list[Coloring]:
@@ -73,9 +75,13 @@ def cloud_colors(source: Source, at: np.ndarray, coloring: Coloring, rotation: n
 
 
 def edge_colors(edges: Edges, *, by_strength: bool, least: float) -> np.ndarray:
-    """Color edge points by their kind, or by strength from `least` (light) to 1 (dark)."""
+    """Color edge points by their kind, the likelier none the paler, or by strength from `least` (light) to 1 (dark)."""
     if not by_strength:
-        return kind_colors(edges.kind)
+        colors = kind_colors(edges.kind)
+        if edges.preset == "paper":
+            return colors
+        doubt = np.clip((LIKELY - edges.strength) / (LIKELY - least), 0.0, 1.0)[:, None]
+        return (colors + _PALEST * doubt * (_PALE_GREY - colors.astype(np.float32)) + 0.5).astype(np.uint8)
     if edges.preset == "paper":  # its strengths are shares of the largest step there can be: all small
         return ramp_colors(1.0 - edges.strength / edges.strength.max(initial=1e-9))
     return ramp_colors((1.0 - edges.strength) / (1.0 - least))

@@ -17,7 +17,7 @@ from edgel.view.colors import colorings
 from edgel.view.commands import command_line, python_lines
 from edgel.view.controls import Controls
 from edgel.view.latest import Latest
-from edgel.view.pick import describe, pick
+from edgel.view.pick import Picked, Row, describe, find, pick, row_of
 from edgel.view.save import edges_file, picture_file, png
 from edgel.view.session import Pane, Session
 
@@ -37,6 +37,7 @@ class Page:
         self._lock = threading.Lock()
         self._images: dict[str, PaperEdges] = {}
         self._panes: list[Pane] = []
+        self._picked: Row | None = None
         server.gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
         server.gui.set_panel_label("edgel view")
         server.gui.main_panel.dock_right()
@@ -84,9 +85,10 @@ class Page:
         time.sleep(_HEAD_START)
         self._canvas.draw(panes, settings)
         self._server.flush()
-        if any(new.edges is not old.edges for new, old in zip(panes, self._panes, strict=False)):
-            self._canvas.mark(None)
+        changed = [pane.edges for pane in panes] != [pane.edges for pane in self._panes]  # Edges equal only themselves
         self._panes = panes
+        if changed and self._picked is not None:
+            self._pick(find(panes, self._picked))
         self._show_images(panes)
         lines = (
             {}
@@ -115,13 +117,18 @@ class Page:
         """Show the numbers of the edge point that was clicked."""
         camera = event.client.camera
         reach = _CLICK * 2 * np.tan(camera.fov / 2) / max(camera.image_height, 1)
-        panes, shown = self._panes, self._canvas.shown
+        shown = self._canvas.shown
         sizes = [self._canvas.edge_size(number) for number in range(len(shown))]
         ray = np.array(event.ray_origin), np.array(event.ray_direction)
         picked = pick(shown, *ray, max_angle=float(reach), radius=max(sizes, default=0.0))
+        self._pick(picked)
+
+    def _pick(self, picked: Picked | None) -> None:
+        """Mark an edge point and show its numbers, or none."""
+        self._picked = None if picked is None else row_of(self._panes, picked)
         self._canvas.mark(picked)
         self._controls.numbers.content = texts.numbers(
-            None if picked is None else describe(panes[picked.pane], picked.edge)
+            None if picked is None else describe(self._panes[picked.pane], picked.edge)
         )
 
     def _save_edges(self, event: viser.GuiEvent[Any]) -> None:

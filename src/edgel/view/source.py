@@ -21,7 +21,7 @@ from edgel.view.select import in_box
 from edgel.view.settings import Settings
 
 MAX_SHOWN = 3_000_000  # points that a browser turns without stutter
-FEW = 200_000  # points that one draws in software in a tenth of a second
+FEW = 100_000  # points that are drawn in software without a delay to be felt
 _TAIL = 2.5  # percent of the points at either end that do not count for how far the cloud reaches: a sweep's far ones
 _SLACK = 0.25  # of the reach without them: a cloud without outliers reaches as far as it does
 _SAMPLE = 200_000  # points that are enough to tell how far a cloud reaches
