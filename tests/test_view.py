@@ -624,7 +624,8 @@ def test_clouds_stand_side_by_side(open_session, hall_file, tmp_path):
 def test_the_first_view_is_filled(open_session, tmp_path):
     depth = np.linspace(1.0, 3.0, 40)[:, None, None]
     across = np.linspace(-0.5, 0.5, 40)
-    pyramid = np.stack([depth * across[:, None], depth * across, depth + np.zeros((40, 40))], axis=-1).reshape(-1, 3)
+    columns = np.broadcast_arrays(depth * across[:, None], depth * across, depth)
+    pyramid = np.stack(columns, axis=-1).reshape(-1, 3)
     np.save(tmp_path / "pyramid.npy", pyramid)  # narrow where it is near: its box reaches far beside it there
     session = open_session([str(tmp_path / "pyramid.npy")])
     assert session.wait_idle(TIMEOUT)
@@ -688,7 +689,7 @@ def test_heights_wear_the_colors_of_pictures(open_session, tmp_path):
 
 def test_unlikely_edges_are_pale():
     edges = edgel.detect(hall())
-    creases = edges.take(edges.kind == EdgeKind.CREASE).take([0, 1, 2])
+    creases = edges.take(edges.kind == EdgeKind.CREASE).take(np.arange(3))
     colors = edge_colors(replace(creases, strength=np.array([0.2, 0.35, 0.5])), by_strength=False, least=0.2)
     away = abs(colors.astype(int) - KIND_COLORS[EdgeKind.CREASE]).sum(axis=1)
     assert away[0] > away[1] > away[2] == 0

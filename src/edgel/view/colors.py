@@ -24,7 +24,7 @@ _LIGHT = np.array([-0.35, -0.45, 0.82])  # towards the light, in the scene: from
 _GREYS = (105.0, 232.0)
 _INTENSITY_GREYS = (20.0, 245.0)
 _FLAT_GREY = 180
-_PALE_GREY, _PALEST = 225, 0.8  # what the least likely edge points fade into, and how far
+_PALE_GREY = 225  # what unlikely edge points fade into, all the more the less likely
 
 
 def colorings(source: Source) -> list[Coloring]:
@@ -64,7 +64,9 @@ def cloud_colors(source: Source, at: np.ndarray, coloring: Coloring, rotation: n
     normals = None if source.normals is None else source.normals[at] @ rotation.T.astype(np.float32)
     if coloring is Coloring.NORMALS and normals is not None:
         return (127.5 * np.nan_to_num(normals) + 128).astype(np.uint8)
-    light = 1.0 if normals is None else np.clip(np.nan_to_num(normals @ _LIGHT) * 0.65 + 0.35, 0.0, 1.0)
+    light = np.ones(len(at))
+    if normals is not None:
+        light = np.clip(np.nan_to_num(normals @ _LIGHT.astype(np.float32)) * 0.65 + 0.35, 0.0, 1.0)
     if coloring is Coloring.HEIGHT:
         heights = source.cloud.xyz[:, 2]  # as in pictures, whatever stands upright in the scene
         return (muted(height_colors(heights[rows], heights[source.shown]), light) + 0.5).astype(np.uint8)
@@ -75,13 +77,13 @@ def cloud_colors(source: Source, at: np.ndarray, coloring: Coloring, rotation: n
 
 
 def edge_colors(edges: Edges, *, by_strength: bool, least: float) -> np.ndarray:
-    """Color edge points by their kind, the likelier none the paler, or by strength from `least` (light) to 1 (dark)."""
+    """Color edge points by their kind, unlikely ones paler, or by strength from `least` (light) to 1 (dark)."""
     if not by_strength:
         colors = kind_colors(edges.kind)
         if edges.preset == "paper":
             return colors
-        doubt = np.clip((LIKELY - edges.strength) / (LIKELY - least), 0.0, 1.0)[:, None]
-        return (colors + _PALEST * doubt * (_PALE_GREY - colors.astype(np.float32)) + 0.5).astype(np.uint8)
+        doubt = np.clip(1.0 - edges.strength / LIKELY, 0.0, 1.0)[:, None]
+        return (colors + doubt * (_PALE_GREY - colors.astype(np.float32)) + 0.5).astype(np.uint8)
     if edges.preset == "paper":  # its strengths are shares of the largest step there can be: all small
         return ramp_colors(1.0 - edges.strength / edges.strength.max(initial=1e-9))
     return ramp_colors((1.0 - edges.strength) / (1.0 - least))
