@@ -174,6 +174,24 @@ def test_a_large_cloud_is_drawn_in_part_until_every_point_is_asked_for(browser, 
         page.close()
 
 
+def test_the_view_fits_the_window_until_it_is_turned(browser, served, errors):
+    page = open_tab(browser, served[0], errors)
+    where = "() => window.__viserMutable.camera.position.length()"
+    near = page.evaluate(where)
+    page.set_viewport_size({"width": 700, "height": 600})
+    wait_for(lambda: page.evaluate(where) > 1.1 * near, "a step back from the narrow window")
+    far = page.evaluate(where)
+    page.mouse.move(100, 300)
+    page.mouse.wheel(0, -300)
+    wait_for(lambda: page.evaluate(where) < 0.95 * far, "a step forward")
+    page.wait_for_timeout(1000)
+    chosen = page.evaluate(where)
+    page.set_viewport_size({"width": 900, "height": 600})
+    page.wait_for_timeout(1000)
+    assert abs(page.evaluate(where) - chosen) < 0.01 * chosen
+    page.close()
+
+
 def test_kinds_are_switched(page):
     all_edges = shown(page)
     input_of(page, "boundary").click()

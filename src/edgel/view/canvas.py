@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import numpy as np
@@ -29,7 +28,7 @@ _NORMAL, _TANGENT = 0.06, 0.05  # lengths of segments, scene units
 _LIFT = 0.012  # scene units from the surface to the tangents, which the edge points would hide
 _CELL = 0.03  # at most one segment a cell of this size, scene units
 _TANGENT_COLOR, _NORMAL_COLORS = (0, 150, 50), ((40, 40, 40), (190, 120, 20))
-_SETTLING = 5.0  # seconds in which a new tab finds its size
+_STILL = 0.01  # scene units: a camera that was not moved by more was not moved by the user
 _ABOVE = 0.12  # scene units from a cloud to its name
 _MARK_COLOR = (255, 220, 0)
 
@@ -42,6 +41,7 @@ class Canvas:
         self._nodes: dict[str, Any] = {}
         self._drawn: dict[str, Any] = {}
         self._laid_out: list[int] = []
+        self._stands: dict[int, np.ndarray] = {}  # where each tab was last made to look from
         self.layout: Layout | None = None
         self.shown: list[np.ndarray] = []
         server.initial_camera.fov = FIELD_OF_VIEW
@@ -73,16 +73,18 @@ class Canvas:
             view = self.layout.view(tab.camera.aspect)
             tab.camera.up_direction = (0.0, 0.0, 1.0)
             tab.camera.position, tab.camera.look_at = view.position, view.target
+            self._stands[tab.client_id] = view.position
 
     def greet(self, client: viser.ClientHandle) -> None:
-        """Let a new tab look at everything, and again when the panel has taken its place in it."""
+        """Let a new tab look at everything, and again when it is resized, as the panel does, until it was turned."""
         self.look(client)
-        until, seen = time.monotonic() + _SETTLING, [client.camera.aspect]
+        seen = [client.camera.aspect]
 
         def resized(camera: viser.CameraHandle) -> None:
-            if camera.aspect != seen[0] and time.monotonic() < until:
-                seen[0] = camera.aspect
+            stood = self._stands.get(client.client_id)
+            if camera.aspect != seen[0] and stood is not None and np.abs(camera.position - stood).max() < _STILL:
                 self.look(client)
+            seen[0] = camera.aspect
 
         client.camera.on_update(resized)
 
