@@ -23,7 +23,7 @@ from edgel.view.colors import cloud_colors, colorings, edge_colors
 from edgel.view.commands import command_line, python_lines
 from edgel.view.latest import Latest
 from edgel.view.layout import FIELD_OF_VIEW, lay_out
-from edgel.view.pick import Picked, describe, pick
+from edgel.view.pick import Picked, describe, find, pick, row_of
 from edgel.view.save import edges_file, picture_file
 from edgel.view.select import select
 from edgel.view.session import LEAST_STRENGTH, Session
@@ -264,12 +264,61 @@ def test_large_clouds_are_drawn_thinned_and_searched_whole(open_session, hall_fi
     session = open_session([hall_file])
     assert session.wait_idle(TIMEOUT)
     (pane,) = session.panes()
-    assert pane.source.is_thinned
+    assert not pane.source.drawn(Settings(every_point=True)).whole
     assert len(pane.source.shown) == 1000
     assert pane.source.normals is not None
     assert pane.source.normals.shape == (1000, 3)
     assert pane.edges is not None
     same(pane.edges, edgel.detect(hall()))
+
+
+def test_many_points_are_drawn_in_part_that_lies_evenly(open_session, tmp_path, monkeypatch):
+    monkeypatch.setattr(source_module, "FEW", 500)
+    dense = roof(0.0) / 10  # a hundred times as dense as the sheet beside it, of as many points
+    edgel.write(tmp_path / "two.ply", edgel.Cloud(np.concatenate([dense, roof(0.0) + [100.0, 0, 0]])))
+    session = open_session([str(tmp_path / "two.ply")])
+    assert session.wait_idle(TIMEOUT)
+    (source,) = session.sources
+    drawn = source.drawn(Settings())
+    assert not drawn.whole
+    assert 250 < len(drawn.at) <= 500
+    assert source.cloud is not None
+    x = source.cloud.xyz[source.shown[drawn.at], 0]
+    assert (x > 50).sum() > 10 * (x < 50).sum() > 0
+    every = source.drawn(Settings(every_point=True))
+    assert every.whole
+    assert len(every.at) == 7200
+    assert drawn.spacing > 1.5 > every.spacing
+
+
+def test_a_small_part_is_drawn_with_every_point(open_session, hall_file, monkeypatch):
+    monkeypatch.setattr(source_module, "FEW", 1000)
+    session = open_session([hall_file])
+    assert session.wait_idle(TIMEOUT)
+    (pane,) = session.panes()
+    cropped = Settings(crop=((0.0, 0.1), (0.0, 1.0), (0.0, 1.0)))
+    drawn = pane.source.drawn(cropped)
+    assert drawn.whole
+    (pane,) = session.panes(cropped)
+    np.testing.assert_array_equal(pane.source.shown[drawn.at], np.flatnonzero(in_box(pane.cloud.xyz, pane.box)))
+
+
+def test_edges_that_did_not_change_are_the_same_object(open_session, hall_file):
+    session = open_session([hall_file])
+    assert session.wait_idle(TIMEOUT)
+    edges = session.panes()[0].edges
+    assert session.panes(Settings(coloring=Coloring.HEIGHT, tangents=True))[0].edges is edges
+    assert session.panes(Settings(strength=0.8))[0].edges is not edges
+
+
+def test_nothing_is_drawn_anew_where_nothing_is_new(open_session, hall_file):
+    session = open_session([hall_file])
+    assert session.wait_idle(TIMEOUT)
+    changes = []
+    session.start(lambda: changes.append(session.doing))
+    session.settings = Settings(strength=0.8)  # what moved it draws; there is no more to tell
+    assert session.wait_idle(TIMEOUT)
+    assert changes == []
 
 
 def test_files_of_one_name_are_told_apart(open_session, hall_file, tmp_path):
@@ -517,6 +566,21 @@ def test_clicks_choose_the_foremost():
     assert pick([], *ray, max_angle=0.01) is None
 
 
+def test_a_clicked_point_is_found_again(open_session, hall_file):
+    session = open_session([hall_file])
+    assert session.wait_idle(TIMEOUT)
+    panes = session.panes()
+    assert panes[0].edges is not None
+    weak, strong = int(panes[0].edges.strength.argmin()), int(panes[0].edges.strength.argmax())
+    rows = [row_of(panes, Picked(0, edge)) for edge in (weak, strong)]
+    fewer = session.panes(Settings(strength=float(panes[0].edges.strength[strong])))
+    assert find(fewer, rows[0]) is None
+    found = find(fewer, rows[1])
+    assert found is not None
+    assert row_of(fewer, found) == rows[1]
+    assert find([], rows[0]) is None
+
+
 def test_numbers_of_an_edge_point(open_session, hall_file):
     session = open_session([hall_file])
     assert session.wait_idle(TIMEOUT)
@@ -557,6 +621,22 @@ def test_clouds_stand_side_by_side(open_session, hall_file, tmp_path):
             assert (np.abs(seen @ np.cross(layout.right, layout.away)) < np.tan(FIELD_OF_VIEW / 2) * depth).all()
 
 
+def test_the_first_view_is_filled(open_session, tmp_path):
+    depth = np.linspace(1.0, 3.0, 40)[:, None, None]
+    across = np.linspace(-0.5, 0.5, 40)
+    columns = np.broadcast_arrays(depth * across[:, None], depth * across, depth)
+    pyramid = np.stack(columns, axis=-1).reshape(-1, 3)
+    np.save(tmp_path / "pyramid.npy", pyramid)  # narrow where it is near: its box reaches far beside it there
+    session = open_session([str(tmp_path / "pyramid.npy")])
+    assert session.wait_idle(TIMEOUT)
+    (pane,) = session.panes()
+    layout = lay_out([pane.source])
+    view = layout.view(1.0)
+    seen = layout.places[0].to_scene(pane.cloud.xyz) - view.position
+    reach = np.abs(np.stack([seen @ layout.right, seen @ np.cross(layout.right, layout.away)])) / (seen @ layout.away)
+    assert 0.9 < reach.max() / np.tan(FIELD_OF_VIEW / 2) < 1
+
+
 def test_colors_are_offered_where_the_file_has_them(open_session, tmp_path):
     xyz = hall()
     red = np.linspace(0, 255, len(xyz)).astype(np.uint8)
@@ -568,10 +648,10 @@ def test_colors_are_offered_where_the_file_has_them(open_session, tmp_path):
     rgb, plain = session.sources
     assert set(colorings(rgb)) == set(Coloring)
     assert set(colorings(plain)) == {Coloring.GREY, Coloring.HEIGHT, Coloring.NORMALS}
-    own = cloud_colors(rgb, Coloring.OWN, np.eye(3))
+    own = cloud_colors(rgb, rgb.few, Coloring.OWN, np.eye(3))
     np.testing.assert_allclose(own, np.column_stack(list(color.values())), atol=1)
     for coloring in Coloring:
-        drawn = cloud_colors(rgb, coloring, np.eye(3))
+        drawn = cloud_colors(rgb, rgb.few, coloring, np.eye(3))
         assert drawn.shape == xyz.shape
         assert drawn.dtype == np.uint8
         assert drawn.std() > 5
@@ -591,6 +671,29 @@ def test_edges_of_color_are_found_when_asked_for(open_session, tmp_path):
     assert pane.edges is not None
     same(pane.edges, edgel.detect(pane.cloud, kinds=DEFAULT_KINDS | EdgeKind.COLOR))
     assert pane.edges.count_kinds()["color"] > 20
+
+
+def test_heights_wear_the_colors_of_pictures(open_session, tmp_path):
+    x, y = np.meshgrid(np.arange(200.0), np.arange(100.0))
+    steps = np.c_[x.ravel(), y.ravel(), 10 * np.floor(x.ravel() / 50)]  # four level terraces
+    edgel.write(tmp_path / "steps.ply", edgel.Cloud(steps))
+    session = open_session([str(tmp_path / "steps.ply")])
+    assert session.wait_idle(TIMEOUT)
+    (source,) = session.sources
+    on_page = cloud_colors(source, source.few, Coloring.HEIGHT, np.eye(3)).astype(int)
+    drawn = plot.picture(source.cloud, direction=[0, 0, -1], color_by="height", size=(800, 600)).astype(int)
+    for terrace in range(4):
+        middle = np.flatnonzero((steps[:, 0] == 50 * terrace + 25) & (steps[:, 1] == 50))[0]
+        assert (abs(drawn - on_page[middle]).max(axis=2) <= 6).sum() > 5000
+
+
+def test_unlikely_edges_are_pale():
+    edges = edgel.detect(hall())
+    creases = edges.take(edges.kind == EdgeKind.CREASE).take(np.arange(3))
+    colors = edge_colors(replace(creases, strength=np.array([0.2, 0.35, 0.5])), by_strength=False, least=0.2)
+    away = abs(colors.astype(int) - KIND_COLORS[EdgeKind.CREASE]).sum(axis=1)
+    assert away[0] > away[1] > away[2] == 0
+    assert (colors[:2].min(axis=1) < 200).all()  # and yet of their kind
 
 
 def test_edge_colors_tell_kinds_and_strength():

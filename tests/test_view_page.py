@@ -20,6 +20,13 @@ if CHROMIUM is None:
 
 TIMEOUT = 60.0
 
+HOLD_FRAMES = """async () => {
+    const draw = window.requestAnimationFrame.bind(window), held = [];
+    window.requestAnimationFrame = callback => held.push(callback);
+    window.release = () => { window.requestAnimationFrame = draw; held.forEach(draw); };
+    await new Promise(draw);  // the frame asked for before
+}"""
+
 
 def wait_for(condition, what):
     end = time.monotonic() + TIMEOUT
@@ -39,6 +46,13 @@ def number_in(text, pattern):
     found = re.search(pattern, text)
     assert found is not None, text
     return int(found[1].replace(",", ""))
+
+
+def set_slowly(page, values):
+    """Type numbers no faster than users can: of all that changes within 50 ms viser sends the last alone."""
+    for label, value in values.items():
+        type_number(page, label, value)
+        page.wait_for_timeout(100)
 
 
 def count_pixels(page, kind):
@@ -120,6 +134,71 @@ def test_slider_on_a_large_cloud(browser, folder, errors):
         page.close()
 
 
+def test_a_move_sends_the_edges_and_not_the_cloud(browser, served, errors):
+    sizes = []
+    page = browser.new_page(viewport={"width": 900, "height": 600})
+    page.on("websocket", lambda socket: socket.on("framereceived", lambda content: sizes.append(len(content))))
+    page.goto(served[0])
+    page.locator(".edgel-pane", has_text="edge points shown").first.wait_for(timeout=1000 * TIMEOUT)
+    wait_for(lambda: count_pixels(page, EdgeKind.BOUNDARY) > 50, "the edges in the picture")
+    cloud = 15 * 40_000  # bytes: three coordinates and a color a point
+    assert sum(sizes) > cloud / 3  # it is compressed
+    before = shown(page)
+    sizes.clear()
+    type_number(page, "Strength ≥", 0.8)
+    wait_for(lambda: shown(page) < before, "fewer edges")
+    page.wait_for_timeout(500)
+    assert 0 < sum(sizes) < cloud / 10
+    type_number(page, "Strength ≥", 0.5)
+    wait_for(lambda: shown(page) == before, "all edges")
+    page.close()
+
+
+def test_the_number_of_edges_does_not_wait_for_a_frame(page):
+    before = shown(page)
+    page.evaluate(HOLD_FRAMES)
+    type_number(page, "Strength ≥", 0.8)
+    wait_for(lambda: shown(page) < before, "fewer edges, though nothing is drawn")
+    page.evaluate("() => window.release()")
+    type_number(page, "Strength ≥", 0.5)
+    wait_for(lambda: shown(page) == before, "all edges")
+
+
+def test_a_large_cloud_is_drawn_in_part_until_every_point_is_asked_for(browser, folder, errors, monkeypatch):
+    from edgel.view import source
+    from edgel.view.server import running
+
+    monkeypatch.setattr(source, "FEW", 10_000)
+    with running([str(folder / "tee.ply")]) as (server, _, _):
+        page = open_tab(browser, f"http://127.0.0.1:{server.get_port()}", errors)
+        drawn = number_in(page.locator(".edgel-status").inner_text(), r"only ([\d,]+) points are drawn")
+        assert 5_000 < drawn <= 10_000
+        before, edges = picture(page), shown(page)
+        input_of(page, "Every point").click()
+        wait_for(lambda: "points are drawn" not in page.locator(".edgel-status").inner_text(), "nothing left out")
+        wait_for(lambda: (picture(page) != before).any(axis=2).sum() > 50, "another picture")
+        assert shown(page) == edges
+        page.close()
+
+
+def test_the_view_fits_the_window_until_it_is_turned(browser, served, errors):
+    page = open_tab(browser, served[0], errors)
+    where = "() => window.__viserMutable.camera.position.length()"
+    near = page.evaluate(where)
+    page.set_viewport_size({"width": 700, "height": 600})
+    wait_for(lambda: page.evaluate(where) > 1.1 * near, "a step back from the narrow window")
+    far = page.evaluate(where)
+    page.mouse.move(100, 300)
+    page.mouse.wheel(0, -300)
+    wait_for(lambda: page.evaluate(where) < 0.95 * far, "a step forward")
+    page.wait_for_timeout(1000)
+    chosen = page.evaluate(where)
+    page.set_viewport_size({"width": 900, "height": 600})
+    page.wait_for_timeout(1000)
+    assert abs(page.evaluate(where) - chosen) < 0.01 * chosen
+    page.close()
+
+
 def test_kinds_are_switched(page):
     all_edges = shown(page)
     input_of(page, "boundary").click()
@@ -161,6 +240,15 @@ def test_click_shows_the_numbers(page):
     page.locator(".edgel-point", has_text="boundary").wait_for()
     row = number_in(page.locator(".edgel-point").inner_text(), r"row\s+([\d,]+)")
     assert 0 <= row < 40_000
+    choose(page, "Color edges by", "strength")
+    wait_for(lambda: count_pixels(page, EdgeKind.BOUNDARY) == 0, "other colors")
+    marked = "() => Boolean(window.__viserMutable.nodeRefFromName['/picked'])"
+    assert page.evaluate(marked)
+    choose(page, "Color edges by", "kind")
+    input_of(page, "boundary").click()
+    page.locator(".edgel-point", has_text="boundary").wait_for(state="detached")
+    wait_for(lambda: not page.evaluate(marked), "no mark where there is no edge point")
+    input_of(page, "boundary").click()
 
 
 def test_published_method_beside_with_its_images(page, served):
@@ -187,9 +275,25 @@ def test_crop_and_colors(page):
     assert "in_box" in page.locator(".edgel-code").inner_text()
     page.get_by_role("button", name="Whole cloud").click()
     wait_for(lambda: shown(page) == before, "all edges")
+    grey = np.ptp(picture(page), axis=2).mean()
     choose(page, "Color cloud by", "height")
-    wait_for(lambda: np.ptp(picture(page), axis=2).mean() > 20, "a colored cloud")
+    wait_for(lambda: np.ptp(picture(page), axis=2).mean() > grey + 8, "a colored cloud")
     choose(page, "Color cloud by", "grey")
+
+
+def test_python_lines_of_the_page_find_what_it_shows(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    everything = shown(page)
+    set_slowly(page, {"Strength ≥": 0.6, "Angle ≥ (°)": 20, "Scale": 2})
+    wait_for(lambda: "at scale 2" in page.locator(".edgel-status").inner_text(), "the edges at a scale")
+    lines = page.locator(".edgel-code pre").last
+    wait_for(lambda: "min_strength=0.6" in lines.inner_text() and "radians(20)" in lines.inner_text(), "the lines")
+    found = {}
+    exec(lines.inner_text(), found)
+    assert 0 < len(found["edges"]) == shown(page) < everything
+    assert "without the scale, least angle" in page.locator(".edgel-code pre").first.inner_text()
+    set_slowly(page, {"Strength ≥": 0.5, "Angle ≥ (°)": 0, "Scale": 1})
+    wait_for(lambda: shown(page) == everything, "all edges")
 
 
 def test_two_tabs_twenty_moves_and_a_tab_closed_meanwhile(page, browser, served, errors):

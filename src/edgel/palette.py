@@ -31,6 +31,10 @@ _RAMP = np.array(
     [(68, 1, 84), (70, 50, 127), (54, 92, 141), (39, 127, 142), (31, 161, 135), (74, 194, 109), (159, 218, 58)], float
 )
 
+_TAIL = 1.0  # percent of the heights at either end that share the ramp's end colors
+_DARKEST = 0.62  # what is left of a color on the slope that gets least light
+_PALE, _PALE_GREY = 0.45, 225  # share of this grey in the colors of a surface, so that edges stand out
+
 
 def kind_colors(kind: Any) -> np.ndarray:
     """Return the color of each edge point.
@@ -78,6 +82,42 @@ def ramp_colors(values: Any) -> np.ndarray:
     places = np.clip(np.asarray(values, float), 0.0, 1.0) * (len(_RAMP) - 1)
     steps = np.arange(len(_RAMP))
     return np.column_stack([np.rint(np.interp(places, steps, channel)) for channel in _RAMP.T]).astype(np.uint8)
+
+
+def height_colors(heights: Any, of: Any) -> np.ndarray:
+    """Return a color for each height, between the lowest and the highest but for one in a hundred at either end.
+
+    Parameters
+    ----------
+    heights : (E,) array_like
+        Those that are not finite get the color of the lowest.
+    of : (N,) array_like
+        Heights of the whole cloud, all finite, which decide about the ends.
+
+    Returns
+    -------
+    (E, 3) uint8
+        RGB.
+
+    Examples
+    --------
+    >>> height_colors([0.0, 100.0], np.arange(101.0)).tolist()
+    [[68, 1, 84], [159, 218, 58]]
+    """
+    low, high = height_limits(of)
+    return ramp_colors(np.nan_to_num((np.asarray(heights, float) - low) / (high - low or 1.0)))
+
+
+def height_limits(heights: Any) -> tuple[float, float]:
+    """Return the heights that wear the end colors, of heights (N,), all finite."""
+    low, high = np.percentile(heights, [_TAIL, 100.0 - _TAIL])
+    return float(low), float(high)
+
+
+def muted(colors: np.ndarray, shade: np.ndarray | float = 1.0) -> np.ndarray:
+    """Darken colors (..., 3), 0 to 255, by a shade (...,) from 0 to 1, and pale them: of a surface below its edges."""
+    lit = colors.astype(np.float32) * (_DARKEST + (1.0 - _DARKEST) * np.asarray(shade, np.float32))[..., None]
+    return (1.0 - _PALE) * lit + _PALE * _PALE_GREY
 
 
 def as_hex(color: tuple[int, int, int]) -> str:

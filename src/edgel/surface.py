@@ -9,14 +9,10 @@ import numpy as np
 from edgel.cloud import Cloud, check_points
 from edgel.color.channels import intensity_of, rgb_of
 from edgel.legend import Entry
-from edgel.palette import ramp_colors
+from edgel.palette import height_colors, height_limits, muted, ramp_colors
 from edgel.scene import Scene
 
 COLOR_BY = ("grey", "rgb", "intensity", "height", "normals")
-
-_TAIL = 1.0  # percent of the heights at either end that share the ramp's end colors
-_DARKEST = 0.62  # what is left of a color on the slope that gets least light
-_PALE, _PALE_GREY = 0.45, 225  # share of this grey in the colors of a surface, so that edges stand out
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,15 +65,15 @@ class Surface:
         self._color_by = color_by
         self._colors = np.empty((0, 3))  # one a point, 0 to 255; grey and normals come from the picture
         if color_by == "height":
-            heights = cloud.xyz[:, 2]
-            low, high = np.percentile(check_points(cloud, minimum=1).xyz[:, 2], [_TAIL, 100.0 - _TAIL])
-            self._colors = ramp_colors(np.nan_to_num((heights - low) / (high - low or 1.0)))
-            ramp = _muted(ramp_colors(np.linspace(0, 1, 32)), np.ones(32))
+            finite = check_points(cloud, minimum=1).xyz[:, 2]
+            self._colors = height_colors(cloud.xyz[:, 2], finite)
+            low, high = height_limits(finite)
+            ramp = muted(ramp_colors(np.linspace(0, 1, 32)))
             self.entries.append(Entry(ramp.astype(np.uint8), f"{high:.6g}", f"height {low:.6g}"))
         elif color_by in ("rgb", "intensity"):
             self._colors = _carried(cloud, color_by)
             if color_by == "rgb":
-                self._colors = _muted(self._colors, np.ones(len(cloud)))
+                self._colors = muted(self._colors)
 
     def paint(self, scene: Scene, sheet: Sheet) -> np.ndarray:
         """Paint the scene of the cloud, (height, width, 3) uint8 at its fine pixels."""
@@ -85,11 +81,11 @@ class Surface:
         if self._color_by == "grey":
             colors = (sheet.greys[0] + (sheet.greys[1] - sheet.greys[0]) * shade)[..., None]
         elif self._color_by == "normals":
-            colors = _muted(127.5 * (1.0 + scene.normals_by_slope()), shade)
+            colors = muted(127.5 * (1.0 + scene.normals_by_slope()), shade)
         else:
             colors = self._colors[scene.rows][scene.winner]
             if self._color_by == "height":
-                colors = _muted(colors, shade)
+                colors = muted(colors, shade)
         painted = np.empty((*scene.covered.shape, 3), np.uint8)
         painted[...] = (colors + 0.5).astype(np.uint8)
         painted[~scene.covered] = sheet.paper
@@ -104,9 +100,3 @@ def _carried(cloud: Cloud, color_by: str) -> np.ndarray:
         raise ValueError(f"color_by: the cloud carries {lacks}; color it by grey, height or normals")
     values = 255.0 * np.nan_to_num(values, nan=0.5)
     return (values if values.ndim == 2 else values[:, None].repeat(3, axis=1)).astype(np.float32)
-
-
-def _muted(colors: np.ndarray, shade: np.ndarray) -> np.ndarray:
-    """Colors (..., 3), 0 to 255, darkened by the shade (...,) and paled."""
-    lit = colors.astype(np.float32) * (_DARKEST + (1.0 - _DARKEST) * shade)[..., None]
-    return (1.0 - _PALE) * lit + _PALE * _PALE_GREY

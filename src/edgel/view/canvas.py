@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import numpy as np
 import viser
 
+from edgel.detect import LIKELY
 from edgel.edges import Edges
 from edgel.view.colors import cloud_colors, edge_colors
 from edgel.view.layout import FIELD_OF_VIEW, Layout, Place, lay_out
 from edgel.view.pick import Picked
 from edgel.view.scale import thin
-from edgel.view.select import in_box
 from edgel.view.session import LEAST_STRENGTH, Pane
 from edgel.view.settings import Settings
+from edgel.view.source import Drawn
 
 _POINT = 1.5  # side of a point of the cloud, a square, in spacings: no holes, and little drawn twice
 _EDGE = 1.0  # side of an edge point, in those of the cloud
 _RISE = 0.35  # sides of a point by which edge points stand out of the surface, whose points would hide them
+_LOW_RISE = 0.2  # the same for unlikely ones, so that they hide no likely ones
 _LEAST_EDGE = 0.01  # scene units: three pixels on a usual screen
 _SPARSE = 0.01  # scene units: points that lie far from each other for the most part are seen at that size
 _NOTHING = np.zeros((1, 3), np.float32), np.zeros((1, 3), np.uint8)
@@ -27,7 +28,7 @@ _NORMAL, _TANGENT = 0.06, 0.05  # lengths of segments, scene units
 _LIFT = 0.012  # scene units from the surface to the tangents, which the edge points would hide
 _CELL = 0.03  # at most one segment a cell of this size, scene units
 _TANGENT_COLOR, _NORMAL_COLORS = (0, 150, 50), ((40, 40, 40), (190, 120, 20))
-_SETTLING = 5.0  # seconds in which a new tab finds its size
+_STILL = 0.01  # scene units: a camera that was not moved by more was not moved by the user
 _ABOVE = 0.12  # scene units from a cloud to its name
 _MARK_COLOR = (255, 220, 0)
 
@@ -40,6 +41,7 @@ class Canvas:
         self._nodes: dict[str, Any] = {}
         self._drawn: dict[str, Any] = {}
         self._laid_out: list[int] = []
+        self._stands: dict[int, np.ndarray] = {}  # where each tab was last made to look from
         self.layout: Layout | None = None
         self.shown: list[np.ndarray] = []
         server.initial_camera.fov = FIELD_OF_VIEW
@@ -71,16 +73,18 @@ class Canvas:
             view = self.layout.view(tab.camera.aspect)
             tab.camera.up_direction = (0.0, 0.0, 1.0)
             tab.camera.position, tab.camera.look_at = view.position, view.target
+            self._stands[tab.client_id] = view.position
 
     def greet(self, client: viser.ClientHandle) -> None:
-        """Let a new tab look at everything, and again when the panel has taken its place in it."""
+        """Let a new tab look at everything, and again when it is resized, as the panel does, until it was turned."""
         self.look(client)
-        until, seen = time.monotonic() + _SETTLING, [client.camera.aspect]
+        seen = [client.camera.aspect]
 
         def resized(camera: viser.CameraHandle) -> None:
-            if camera.aspect != seen[0] and time.monotonic() < until:
-                seen[0] = camera.aspect
+            stood = self._stands.get(client.client_id)
+            if camera.aspect != seen[0] and stood is not None and np.abs(camera.position - stood).max() < _STILL:
                 self.look(client)
+            seen[0] = camera.aspect
 
         client.camera.on_update(resized)
 
@@ -100,20 +104,24 @@ class Canvas:
 
     def _draw_cloud(self, number: int, pane: Pane, place: Place, settings: Settings) -> None:
         source, name = pane.source, f"/cloud{number}"
-        key = (settings.coloring, settings.crop, settings.size, source.normals is not None)
+        drawn = source.drawn(settings)
+        key = (drawn, settings.coloring, settings.size, source.normals is not None)
         if self._drawn.get(name) == key:  # nearly always, and comparing millions of points would take its time
             return
         self._drawn[name] = key
-        points, colors = pane.cloud.xyz[source.shown], cloud_colors(source, settings.coloring, place.rotation)
-        if settings.is_cropped:
-            inside = in_box(points, pane.box)
-            points, colors = points[inside], colors[inside]
-        self._points(name, place.to_scene(points), colors, settings.size * _point_size(pane, place))
+        points = place.to_scene(pane.cloud.xyz[source.shown[drawn.at]])
+        colors = cloud_colors(source, drawn.at, settings.coloring, place.rotation)
+        self._points(name, points, colors, settings.size * _point_size(drawn, place))
 
     def _draw_edges(self, number: int, pane: Pane, place: Place, settings: Settings) -> np.ndarray:
         """Draw the edge points and their segments; return where the points are."""
+        edges, name = pane.edges, f"/edges{number}"
+        side = _point_size(pane.source.drawn(settings), place)
+        key = (edges, side, settings.size, settings.by_strength, settings.tangents, settings.normals)
+        if self._drawn.get(name) == key:
+            return self.shown[number]
+        self._drawn[name] = key
         points, colors, segments = np.empty((0, 3), np.float32), np.empty((0, 3), np.uint8), {}
-        edges = pane.edges
         if edges is not None and len(edges):
             points = place.to_scene(pane.cloud.xyz[edges.index])
             colors = edge_colors(edges, by_strength=settings.by_strength, least=LEAST_STRENGTH)
@@ -122,14 +130,14 @@ class Canvas:
                 segments["tangents"] = _tangents(edges.take(rows), points[rows], place)
             if settings.normals:
                 segments["normals"] = _normals(edges.take(rows), points[rows], place)
-        size = settings.size * max(_EDGE * _point_size(pane, place), _LEAST_EDGE)
         drawn = points
         if edges is not None:
-            lift = (_RISE * _point_size(pane, place) * _outwards(edges, place)).astype(np.float32)
+            rise = np.where((edges.strength < LIKELY) & (edges.preset == "default"), _LOW_RISE, _RISE)
+            lift = (rise[:, None] * side * _outwards(edges, place)).astype(np.float32)
             drawn, colors = np.concatenate([points + lift, points - lift]), np.concatenate([colors, colors])
-        self._points(f"/edges{number}", drawn, colors, size)
-        for name in ("tangents", "normals"):
-            self._segments(f"/{name}{number}", segments.get(name))
+        self._points(name, drawn, colors, settings.size * max(_EDGE * side, _LEAST_EDGE))
+        for what in ("tangents", "normals"):
+            self._segments(f"/{what}{number}", segments.get(what))
         return points
 
     def _points(self, name: str, points: np.ndarray, colors: np.ndarray, size: float) -> None:
@@ -143,11 +151,15 @@ class Canvas:
         node.visible = len(points) > 0
 
     def _segments(self, name: str, segments: tuple[np.ndarray, np.ndarray] | None) -> None:
-        self._remove(name)
-        if segments is not None and len(segments[0]):
+        node = self._nodes.get(name)
+        if segments is None or not len(segments[0]):
+            self._remove(name)
+        elif node is None:
             self._nodes[name] = self._server.scene.add_line_segments(
                 name, *segments, thickness=2.0, thickness_units="screen"
             )
+        else:
+            node.points, node.colors = segments
 
     def _label(self, name: str, text: str, place: Place) -> None:
         if name not in self._nodes:
@@ -167,12 +179,9 @@ class Canvas:
         self._drawn.clear()
 
 
-def _point_size(pane: Pane, place: Place) -> float:
+def _point_size(drawn: Drawn, place: Place) -> float:
     """Side of the points of a cloud, in scene units: their spacing, more where most lie farther apart than that."""
-    drawn = len(pane.source.shown)
-    # Where only a part is drawn the gaps are wider.
-    spacing = pane.source.spacing * place.unit * np.sqrt(len(pane.cloud) / drawn if pane.source.is_thinned else 1.0)
-    return float(max(_POINT * spacing, min(3.0 / np.sqrt(drawn), _SPARSE)))
+    return float(max(_POINT * drawn.spacing * place.unit, min(3.0 / np.sqrt(max(len(drawn.at), 1)), _SPARSE)))
 
 
 def _outwards(edges: Edges, place: Place) -> np.ndarray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import viser
@@ -54,6 +54,9 @@ class Controls:
             self.edge_colors = gui.add_dropdown("Color edges by", _EDGE_COLORS)
             self.tangents = gui.add_checkbox("Tangents", False, hint="Green segments along the edge")
             self.normals = gui.add_checkbox("Normals", False, hint="Segments: grey one face's, ochre the other's")
+            self.every_point = gui.add_checkbox(
+                "Every point", False, hint="Draw all points of the cloud, which without a graphics card takes its time"
+            )
             self.size = gui.add_slider("Point size", 0.5, 4.0, 0.1, 1.0)
             self.look = gui.add_button("Show everything", hint="Put the camera back to where it began")
         with gui.add_folder("Crop", expand_by_default=False):
@@ -91,15 +94,18 @@ class Controls:
             by_strength=self.edge_colors.value == "strength",
             tangents=self.tangents.value,
             normals=self.normals.value,
+            every_point=self.every_point.value,
             size=self.size.value,
         )
 
-    def offer(self, sources: Iterable[Source], colorings: list[Coloring]) -> None:
-        """Offer only what the files carry: colorings, and edges of colors."""
+    def offer(self, sources: Sequence[Source], colorings: list[Coloring]) -> None:
+        """Offer only what the files carry: colorings, edges of colors, and more points than are drawn at first."""
         names = tuple(coloring.value for coloring in Coloring if coloring in colorings)
         if self.coloring.options != names:
             self.coloring.options = names
         self.kinds[EdgeKind.COLOR].visible = any(source.has_color for source in sources)
+
+        self.every_point.visible = any(len(source.few) < len(source.shown) for source in sources)
 
     def fit_method(self, settings: Settings) -> None:
         """Grey out what the method shown does not heed."""
@@ -118,7 +124,7 @@ class Controls:
     def _settings_handles(self) -> list[Any]:
         return [
             *(self.method, self.strength, self.angle, self.scale, self.coloring, self.edge_colors),
-            *(self.tangents, self.normals, self.size),
+            *(self.tangents, self.normals, self.every_point, self.size),
             *self.kinds.values(),
             *self.crop,
         ]

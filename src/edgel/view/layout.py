@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 
+from edgel.view.select import in_box
 from edgel.view.source import Source, reach
 
 FIELD_OF_VIEW = 0.7  # of the page's camera, vertical, radians
@@ -69,25 +69,26 @@ class Layout:
     Attributes
     ----------
     places : list of Place
+    points : (P, 3) float64
+        Points of all clouds in the scene, without far ones: what the first view must show.
     away, right : (3,) float64
-        Where the first view looks, and what is to its right.
+        Where it looks, and what is to its right.
     same_scale : bool
         Whether all clouds are drawn to the same scale.
     """
 
     places: list[Place]
+    points: np.ndarray
     away: np.ndarray
     right: np.ndarray
     same_scale: bool
 
     def view(self, aspect: float) -> View:
-        """Step back until the corners of all boxes are in a picture of this width by height."""
-        signs = np.array(list(product((-1.0, 1.0), repeat=3)))
-        corners = np.concatenate([place.offset + signs * place.half for place in self.places])
-        target = (corners.min(axis=0) + corners.max(axis=0)) / 2
-        corners, up, reach_up = corners - target, np.cross(self.right, self.away), np.tan(FIELD_OF_VIEW / 2)
-        need = np.maximum(np.abs(corners @ self.right) / (reach_up * aspect), np.abs(corners @ up) / reach_up)
-        return View(target - _MARGIN * float((need - corners @ self.away).max()) * self.away, target)
+        """Step back until all points are in a picture of this width by height."""
+        target = (self.points.min(axis=0) + self.points.max(axis=0)) / 2
+        points, up, reach_up = self.points - target, np.cross(self.right, self.away), np.tan(FIELD_OF_VIEW / 2)
+        need = np.maximum(np.abs(points @ self.right) / (reach_up * aspect), np.abs(points @ up) / reach_up)
+        return View(target - _MARGIN * float((need - points @ self.away).max()) * self.away, target)
 
 
 def lay_out(sources: Sequence[Source]) -> Layout:
@@ -101,11 +102,15 @@ def lay_out(sources: Sequence[Source]) -> Layout:
     right /= np.linalg.norm(right)
     widths = [2 * float(np.abs(right) @ half) * unit for (_, _, half), unit in zip(turned, units, strict=True)]
     left = -(sum(widths) + _GAP * (len(widths) - 1)) / 2
-    places = []
-    for (rotation, centre, half), unit, width in zip(turned, units, widths, strict=True):
-        places.append(Place(rotation, centre, unit, (left + width / 2) * right, half * unit))
+    places, points = [], []
+    for source, (rotation, centre, half), unit, width in zip(sources, turned, units, widths, strict=True):
+        place = Place(rotation, centre, unit, (left + width / 2) * right, half * unit)
+        assert source.cloud is not None
+        seen = place.to_scene(source.cloud.xyz[source.shown[source.few]]).astype(float)
+        points.append(seen[in_box(seen, place.offset + 1.001 * place.half * [[-1], [1]])])
+        places.append(place)
         left += width + _GAP
-    return Layout(places, away, right, same_scale)
+    return Layout(places, np.concatenate(points), away, right, same_scale)
 
 
 def _turned(source: Source) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

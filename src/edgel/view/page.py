@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from typing import Any
 
 import numpy as np
@@ -16,10 +17,11 @@ from edgel.view.colors import colorings
 from edgel.view.commands import command_line, python_lines
 from edgel.view.controls import Controls
 from edgel.view.latest import Latest
-from edgel.view.pick import describe, pick
+from edgel.view.pick import Picked, Row, describe, find, pick, row_of
 from edgel.view.save import edges_file, picture_file, png
 from edgel.view.session import Pane, Session
 
+_HEAD_START = 0.005  # seconds in which the texts leave before the scene
 _CLICK = 8  # pixels that a click may miss an edge point by
 
 
@@ -31,10 +33,11 @@ class Page:
     """
 
     def __init__(self, server: viser.ViserServer, session: Session) -> None:
-        self._session = session
+        self._server, self._session = server, session
         self._lock = threading.Lock()
         self._images: dict[str, PaperEdges] = {}
         self._panes: list[Pane] = []
+        self._picked: Row | None = None
         server.gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
         server.gui.set_panel_label("edgel view")
         server.gui.main_panel.dock_right()
@@ -75,13 +78,18 @@ class Page:
             controls.offer(sources, [coloring for source in sources for coloring in colorings(source)])
         controls.fit_method(settings)
         pane = controls.choose_pane(panes)
-        self._canvas.draw(panes, settings)
-        if any(new.edges is not old.edges for new, old in zip(panes, self._panes, strict=False)):
-            self._canvas.mark(None)
-        self._panes = panes
-        self._show_images(panes)
         controls.status.content = texts.status(session, panes, settings)
         controls.legend.content = texts.legend(panes, settings)
+        # The browser shows texts at once; those in one message with the scene would wait for a frame to be drawn.
+        self._server.flush()
+        time.sleep(_HEAD_START)
+        self._canvas.draw(panes, settings)
+        self._server.flush()
+        changed = [pane.edges for pane in panes] != [pane.edges for pane in self._panes]  # Edges equal only themselves
+        self._panes = panes
+        if changed and self._picked is not None:
+            self._pick(find(panes, self._picked))
+        self._show_images(panes)
         lines = (
             {}
             if pane is None
@@ -109,13 +117,18 @@ class Page:
         """Show the numbers of the edge point that was clicked."""
         camera = event.client.camera
         reach = _CLICK * 2 * np.tan(camera.fov / 2) / max(camera.image_height, 1)
-        panes, shown = self._panes, self._canvas.shown
+        shown = self._canvas.shown
         sizes = [self._canvas.edge_size(number) for number in range(len(shown))]
         ray = np.array(event.ray_origin), np.array(event.ray_direction)
         picked = pick(shown, *ray, max_angle=float(reach), radius=max(sizes, default=0.0))
+        self._pick(picked)
+
+    def _pick(self, picked: Picked | None) -> None:
+        """Mark an edge point and show its numbers, or none."""
+        self._picked = None if picked is None else row_of(self._panes, picked)
         self._canvas.mark(picked)
         self._controls.numbers.content = texts.numbers(
-            None if picked is None else describe(panes[picked.pane], picked.edge)
+            None if picked is None else describe(self._panes[picked.pane], picked.edge)
         )
 
     def _save_edges(self, event: viser.GuiEvent[Any]) -> None:

@@ -29,6 +29,14 @@ class Picked:
     edge: int
 
 
+@dataclass(frozen=True)
+class Row:
+    """An edge point wherever it is shown: the name of its pane, and its row in the file."""
+
+    pane: str
+    row: int
+
+
 def pick(
     shown: Sequence[np.ndarray], origin: np.ndarray, direction: np.ndarray, *, max_angle: float, radius: float = 0.0
 ) -> Picked | None:
@@ -68,6 +76,22 @@ def pick(
     best = int(front[np.argmin(off[front] / along[front])])
     pane = int(number[best])
     return Picked(pane, best - int(np.searchsorted(number, pane)))
+
+
+def row_of(panes: Sequence[Pane], picked: Picked) -> Row:
+    """Return what stays the same of an edge point when others are shown beside it."""
+    edges = panes[picked.pane].edges
+    assert edges is not None
+    return Row(panes[picked.pane].name, int(edges.index[picked.edge]))
+
+
+def find(panes: Sequence[Pane], row: Row) -> Picked | None:
+    """Find an edge point again, or None where it is not shown any more."""
+    for number, pane in enumerate(panes):
+        if pane.name == row.pane and pane.edges is not None:
+            places = np.flatnonzero(pane.edges.index == row.row)
+            return Picked(number, int(places[0])) if len(places) else None
+    return None
 
 
 def describe(pane: Pane, edge: int) -> dict[str, str]:

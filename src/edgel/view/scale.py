@@ -78,6 +78,24 @@ def thin(points: Any, size: float) -> np.ndarray:
     return checked.rows[np.sort(order[first])]
 
 
+def thin_to(xyz: np.ndarray, number: int, spacing: float) -> np.ndarray:
+    """Choose at most this many of the points (N, 3), all finite, that lie evenly: one a voxel, as small as will do.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> x, y = np.meshgrid(np.arange(30.0), np.arange(30.0))
+    >>> len(thin_to(np.c_[x.ravel(), y.ravel(), 0 * x.ravel()], 225, 1.0))
+    225
+    """
+    rows = np.arange(len(xyz))
+    size = (spacing or 1.0) * float(np.sqrt(len(rows) / number))
+    while len(rows) > number:
+        rows = rows[thin(xyz[rows], size)]
+        size *= max(float(np.sqrt(len(rows) / number)), 1.05)
+    return rows
+
+
 def detect_at_scale(
     points: Any,
     scale: float = 1.0,

@@ -8,6 +8,7 @@ import time
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -107,6 +108,7 @@ class Session:
         self._detect = detect
         self._answers: dict[Run, Answer] = {}
         self._last: dict[tuple[int, str], Run] = {}
+        self._selected: dict[tuple[int, str], tuple[Any, Edges]] = {}
         self._closed = False
         self._worker = Latest(self._work, "edgel view detector")
 
@@ -153,11 +155,23 @@ class Session:
         box = settings.box(source.low, source.high)
         edges = None
         if answer is not None and answer.edges is not None:
-            edges = select(answer.edges, source.cloud.xyz, settings, box)
+            edges = self._select(number, preset, answer, settings)
         name = source.name
         if len(settings.presets) > 1:
             name += " · paper" if preset == "paper" else " · edgel"
         return Pane(name, source, source.cloud, preset, run, answer, edges, box, run == wanted)
+
+    def _select(self, number: int, preset: str, answer: Answer, settings: Settings) -> Edges:
+        """Return the edges of an answer that the settings show, the same object for as long as they are the same."""
+        cloud, source = self.sources[number].cloud, self.sources[number]
+        assert cloud is not None
+        assert answer.edges is not None
+        key = (answer, settings.strength, settings.angle, settings.kinds, settings.crop)
+        last = self._selected.get((number, preset))
+        if last is None or last[0] != key:
+            edges = select(answer.edges, cloud.xyz, settings, settings.box(source.low, source.high))
+            last = self._selected[number, preset] = key, edges
+        return last[1]
 
     def _wanted_run(self, number: int, preset: str, settings: Settings) -> Run:
         return settings.run(number, preset, has_color=self.sources[number].has_color)
@@ -226,5 +240,6 @@ class Session:
         self._changed()
 
     def _say(self, what: str) -> None:
-        self.doing = what
-        self._changed()
+        if what != self.doing:
+            self.doing = what
+            self._changed()

@@ -71,6 +71,8 @@ class Settings:
         Whether edges are colored by strength, else by kind.
     tangents, normals : bool
         Whether they are drawn as segments.
+    every_point : bool
+        Whether all points of the cloud are drawn, however many, else an even part of them.
     size : float
         Size of the points, in their usual one.
     """
@@ -85,6 +87,7 @@ class Settings:
     by_strength: bool = False
     tangents: bool = False
     normals: bool = False
+    every_point: bool = False
     size: float = 1.0
 
     @property

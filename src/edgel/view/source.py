@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,12 +16,34 @@ from edgel.camera import Camera, choose_camera
 from edgel.cloud import Cloud, check_points
 from edgel.color import color_channels
 from edgel.io.errors import describe_error
-from edgel.view.scale import median_spacing
+from edgel.view.scale import median_spacing, thin_to
+from edgel.view.select import in_box
+from edgel.view.settings import Settings
 
 MAX_SHOWN = 3_000_000  # points that a browser turns without stutter
+FEW = 100_000  # points that are drawn in software without a delay to be felt
 _TAIL = 2.5  # percent of the points at either end that do not count for how far the cloud reaches: a sweep's far ones
 _SLACK = 0.25  # of the reach without them: a cloud without outliers reaches as far as it does
 _SAMPLE = 200_000  # points that are enough to tell how far a cloud reaches
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """The points of a cloud that are drawn.
+
+    Attributes
+    ----------
+    at : (D,) int64
+        Their places in `Source.shown`.
+    spacing : float
+        Median distance to the nearest neighbour that is drawn too, in the cloud's unit.
+    whole : bool
+        Whether none is left out of those in the crop box.
+    """
+
+    at: np.ndarray
+    spacing: float
+    whole: bool
 
 
 class Source:
@@ -39,11 +63,13 @@ class Source:
     error : str
         Why it cannot be read; empty if it can.
     shown : (S,) int64
-        Rows that are drawn: the finite ones, or an even random part of them.
+        Rows that can be drawn: the finite ones, or a random part of them.
+    few : (F,) int64
+        Places in `shown` of at most `FEW` that lie evenly, which are drawn until all are asked for.
     normals : (S, 3) float32 or None
-        Of the rows drawn; None until `estimate_normals` was called.
+        Of the rows `shown`; None until `estimate_normals` was called.
     spacing : float
-        Median distance to the nearest neighbour, in the cloud's unit.
+        Median distance of the points `shown` to the nearest of them, in the cloud's unit.
     camera : Camera
         From where the cloud alone is best looked at.
     low, high : (3,) float64
@@ -61,9 +87,10 @@ class Source:
         self._read = read
         self.cloud: Cloud | None = None
         self.error = ""
-        self.shown = np.empty(0, np.int64)
+        self.shown = self.few = np.empty(0, np.int64)
         self.normals: np.ndarray | None = None
-        self.spacing = 0.0
+        self.spacing = self._few_spacing = 0.0
+        self._last: tuple[Any, Drawn] | None = None
         self.camera: Camera
         self.low, self.high = np.zeros(3), np.ones(3)
 
@@ -72,10 +99,23 @@ class Source:
         """Whether it was read, or failed to be."""
         return self.cloud is not None or bool(self.error)
 
-    @property
-    def is_thinned(self) -> bool:
-        """Whether only a part of the points is drawn."""
-        return len(self.shown) == MAX_SHOWN
+    def drawn(self, settings: Settings) -> Drawn:
+        """Return which of the points are drawn: all in the crop box, or an even part where they are too many."""
+        key = (settings.crop, settings.every_point)
+        last = self._last
+        if last is None or last[0] != key:
+            last = self._last = key, self._drawn(settings)
+        return last[1]
+
+    def _drawn(self, settings: Settings) -> Drawn:
+        assert self.cloud is not None
+        inside = np.ones(len(self.shown), bool)
+        if settings.is_cropped:
+            inside = in_box(self.cloud.xyz[self.shown], settings.box(self.low, self.high))
+        number = int(inside.sum())
+        if settings.every_point or number <= FEW:
+            return Drawn(np.flatnonzero(inside), self.spacing, whole=len(self.shown) < MAX_SHOWN)
+        return Drawn(self.few[inside[self.few]], self._few_spacing, whole=False)
 
     @cached_property
     def has_color(self) -> bool:
@@ -91,9 +131,12 @@ class Source:
                 chosen = np.random.default_rng(0).choice(len(rows), MAX_SHOWN, replace=False, shuffle=False)
                 rows = rows[np.sort(chosen)]
             self.shown = rows
-            self.spacing = median_spacing(cloud)
+            xyz = cloud.xyz[rows]
+            self.spacing = median_spacing(xyz)
+            self.few = thin_to(xyz, FEW, self.spacing)
+            self._few_spacing = self.spacing if len(self.few) == len(rows) else median_spacing(xyz[self.few])
             self.camera = choose_camera(cloud, "auto")
-            self.low, self.high = reach(cloud.xyz[rows])
+            self.low, self.high = reach(xyz)
             self.cloud = cloud
         except MemoryError:
             self.error = "not enough memory; thin the cloud or cut it into parts"
@@ -101,7 +144,7 @@ class Source:
             self.error = describe_error(error)
 
     def estimate_normals(self) -> None:
-        """Fit the normals of the points drawn, which the grey is shaded by."""
+        """Fit the normals of the points shown, which the grey is shaded by."""
         if self.cloud is not None and self.normals is None:
             self.normals = edgel.estimate_normals(self.cloud, at=self.shown).normals.astype(np.float32)
 

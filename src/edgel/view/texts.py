@@ -108,8 +108,9 @@ def _pane_status(pane: Pane, settings: Settings) -> str:
         dropped = answer.edges.num_dropped
     if dropped:
         lines[0] += f", {dropped:,} not finite"
-    if pane.source.is_thinned:
-        lines.append(f"only {len(pane.source.shown):,} points are drawn; the detector runs on all")
+    drawn = pane.source.drawn(settings)
+    if not drawn.whole:
+        lines.append(f"only {len(drawn.at):,} points are drawn; the detector runs on all")
     if answer is None:
         lines.append("no edges yet")
     elif answer.edges is None:
