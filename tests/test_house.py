@@ -28,6 +28,7 @@ LAYERS = [
     {"metrics", "palette"},
     {"paper"},
     {"detect"},
+    {"scale"},
 ]
 ONLY_CLOUD = {"io"}  # formats know the cloud (and the threads) and nothing else
 FREE = {

@@ -272,7 +272,7 @@ def test_crop_and_colors(page):
     page.mouse.move(box["x"] - 80, box["y"] + box["height"] / 2, steps=5)
     page.mouse.up()
     wait_for(lambda: shown(page) < before, "fewer edges")
-    assert "in_box" in page.locator(".edgel-code").inner_text()
+    assert "--crop" in page.locator(".edgel-code").inner_text()
     page.get_by_role("button", name="Whole cloud").click()
     wait_for(lambda: shown(page) == before, "all edges")
     grey = np.ptp(picture(page), axis=2).mean()
@@ -291,7 +291,7 @@ def test_python_lines_of_the_page_find_what_it_shows(page, tmp_path, monkeypatch
     found = {}
     exec(lines.inner_text(), found)
     assert 0 < len(found["edges"]) == shown(page) < everything
-    assert "without the scale, least angle" in page.locator(".edgel-code pre").first.inner_text()
+    assert "--min-angle 20" in page.locator(".edgel-code pre").first.inner_text()
     set_slowly(page, {"Strength ≥": 0.5, "Angle ≥ (°)": 0, "Scale": 1})
     wait_for(lambda: shown(page) == everything, "all edges")
 

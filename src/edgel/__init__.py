@@ -6,6 +6,7 @@ from edgel.detect import detect
 from edgel.edges import EdgeKind, Edges
 from edgel.io import FormatError, read, write
 from edgel.normals import Normals, estimate_normals
+from edgel.scale import detect_at_scale
 
 __all__ = [
     "Cloud",
@@ -14,6 +15,7 @@ __all__ = [
     "FormatError",
     "Normals",
     "detect",
+    "detect_at_scale",
     "estimate_normals",
     "paper",
     "read",

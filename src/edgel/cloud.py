@@ -191,6 +191,11 @@ def as_vector(value: Any, name: str) -> np.ndarray:
     return vector
 
 
+def in_box(xyz: np.ndarray, box: np.ndarray) -> np.ndarray:
+    """Mark the points (N, 3) inside a box, its lower and upper corner (2, 3), (N,) bool."""
+    return ((xyz >= box[0]) & (xyz <= box[1])).all(axis=1)
+
+
 def _coordinates(xyz: Any) -> np.ndarray:
     array = np.asarray(xyz)
     if array.dtype.kind not in "fiu":

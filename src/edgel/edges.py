@@ -9,7 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from edgel.cloud import Cloud, as_cloud
+from edgel.cloud import Cloud, as_cloud, in_box
 
 
 class EdgeKind(IntFlag):
@@ -134,6 +134,28 @@ class Edges:
             return self
         kept = self.take((self.kind & wanted) > 0)
         return replace(kept, kind=kept.kind & wanted)
+
+    def drop_blunt(self, angle: float) -> Self:
+        """Take the flag of a crease from edge points whose faces turn less than an angle, in radians.
+
+        Those that are nothing else disappear. Where the angle is not known the crease stays.
+        """
+        blunt = self.angle < angle
+        kind = np.where(blunt, self.kind & ~np.uint8(EdgeKind.CREASE), self.kind)
+        return replace(self, kind=kind).take(kind > 0)
+
+    def inside(self, points: Any, box: Any) -> Self:
+        """Return the edge points of the input that lie in a box: its lower and its upper corner (2, 3), maybe infinite.
+
+        Raises
+        ------
+        ValueError
+            If the box is none.
+        """
+        corners = np.asarray(box, dtype=np.float64)
+        if corners.shape != (2, 3) or not (corners[0] <= corners[1]).all():
+            raise ValueError(f"box: expected a lower and an upper corner of three numbers each, got {box!r}")
+        return self.take(in_box(as_cloud(points).xyz[self.index], corners))
 
     def cloud(self, points: Any) -> Cloud:
         """Return the edge points of the input as a cloud: all its attributes, and what is known of the edge.

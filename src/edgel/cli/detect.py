@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -36,6 +36,7 @@ Examples:
   edgel detect scan.las -o labelled.laz --all
   edgel detect depth.png --intrinsics camera.json -o edges.ply
   edgel detect scan.ply --kinds crease,boundary --method surface -o edges.ply
+  edgel detect scan.ply --scale 4 --min-angle 30 -o large.ply
   edgel detect scan.ply --preset paper --sigma 2 --report report
   cat scan.ply | edgel detect - -o - > edges.ply
 """
@@ -72,6 +73,24 @@ def detect(
         int | None, options.option(edgel.detect, "num_neighbors", "Neighbours of each plane fit, the point among them.")
     ] = None,
     viewpoint: options.Viewpoint = None,
+    scale: Annotated[
+        float | None,
+        options.option(
+            edgel.detect_at_scale,
+            "scale",
+            "Find only what is larger than this many median spacings: on the cloud thinned to one point a voxel.",
+        ),
+    ] = None,
+    min_angle: Annotated[
+        float | None, typer.Option(metavar="DEGREES", help="Leave out creases whose faces turn less than this.")
+    ] = None,
+    crop: Annotated[
+        tuple[float, float, float, float, float, float] | None,
+        typer.Option(
+            metavar="X Y Z X Y Z",
+            help="Leave out edge points outside this box, its lower corner first; -inf and inf are no limit.",
+        ),
+    ] = None,
     intrinsics: options.Intrinsics = None,
     width: Annotated[int | None, options.paper_option("width", "Pixels of the image along x.")] = None,
     height: Annotated[int | None, options.paper_option("height", "Pixels of the image along y.")] = None,
@@ -95,6 +114,7 @@ def detect(
         "min_strength": min_strength,
         "num_neighbors": num_neighbors,
         "viewpoint": viewpoint,
+        "scale": scale,
         "width": width,
         "height": height,
         "kernel_size": kernel_size,
@@ -108,10 +128,13 @@ def detect(
     with exit_codes(as_json=as_json, debug=debug):
         given = check_options(preset, {name: value for name, value in given.items() if value is not None})
         check_outputs(output, report, label_all=label_all, as_json=as_json)
+        if preset == "paper" and min_angle is not None:
+            raise Failure(ExitCode.USAGE, "--min-angle: the paper preset tells no creases apart; leave it out")
         files.check_input(source, intrinsics)
         with Watch() as watch:
             stages = Stages(watch)
             cloud, edges = read_and_detect(source, intrinsics, preset, given, stages)
+            edges = choose(cloud, edges, min_angle, crop)
             if output is not None:
                 with stages("writing"):
                     files.write_cloud(output, edges.label(cloud) if label_all else edges.cloud(cloud))
@@ -155,19 +178,32 @@ def check_options(preset: str, given: dict[str, Any]) -> dict[str, Any]:
 
 def arguments(preset: str) -> set[str]:
     """Return the names of the arguments that a preset has beside the points."""
-    return set(inspect.signature(FUNCTIONS[preset]).parameters) - {"points"}
+    names = {*inspect.signature(edgel.detect_at_scale).parameters, *inspect.signature(FUNCTIONS[preset]).parameters}
+    return names - {"points", "options"}
 
 
 def read_and_detect(
-    source: str, intrinsics: str | None, preset: str, given: Mapping[str, Any], stages: Stages
+    source: str, intrinsics: str | None, preset: Any, given: Mapping[str, Any], stages: Stages
 ) -> tuple[edgel.Cloud, Edges]:
     """Read a cloud and find its edges, with the options that `check_options` let through."""
     with stages("reading"):
         cloud = files.read_cloud(source, intrinsics)
     with failing_as(ExitCode.DATA, source, arguments(preset)):
-        edges = FUNCTIONS[preset](cloud, **given, progress=stages.progress)
+        edges = edgel.detect_at_scale(cloud, preset=preset, **given, progress=stages.progress)
     stages.seconds.update(edges.seconds)
     return cloud, edges
+
+
+def choose(cloud: edgel.Cloud, edges: Edges, min_angle: float | None, crop: Sequence[float] | None) -> Edges:
+    """Return the edge points that are sharp enough, the angle in degrees, and inside a box, corner after corner."""
+    if min_angle is not None:
+        edges = edges.drop_blunt(math.radians(min_angle))
+    if crop is not None:
+        try:
+            edges = edges.inside(cloud, [crop[:3], crop[3:]])
+        except ValueError as error:
+            raise Failure(ExitCode.USAGE, f"--crop: the first corner must be the lower one, got {crop}") from error
+    return edges
 
 
 def check_outputs(output: str | None, report: str | None, *, label_all: bool, as_json: bool) -> None:

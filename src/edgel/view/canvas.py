@@ -9,10 +9,10 @@ import viser
 
 from edgel.detect import LIKELY
 from edgel.edges import Edges
+from edgel.scale import thin
 from edgel.view.colors import cloud_colors, edge_colors
 from edgel.view.layout import FIELD_OF_VIEW, Layout, Place, lay_out
 from edgel.view.pick import Picked
-from edgel.view.scale import thin
 from edgel.view.session import LEAST_STRENGTH, Pane
 from edgel.view.settings import Settings
 from edgel.view.source import Drawn

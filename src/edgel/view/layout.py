@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel.view.select import in_box
+from edgel.cloud import in_box
 from edgel.view.source import Source, reach
 
 FIELD_OF_VIEW = 0.7  # of the page's camera, vertical, radians

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 import edgel
+from edgel.cloud import in_box
 from edgel.view.colors import colorings
 from edgel.view.commands import output_name
-from edgel.view.select import in_box
 from edgel.view.session import Pane
 from edgel.view.settings import Coloring, Settings
 

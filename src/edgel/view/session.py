@@ -17,8 +17,8 @@ from edgel.cloud import Cloud
 from edgel.detect import DEFAULT_KINDS
 from edgel.edges import EdgeKind, Edges
 from edgel.io.errors import describe_error
+from edgel.scale import detect_at_scale
 from edgel.view.latest import Latest
-from edgel.view.scale import detect_at_scale
 from edgel.view.select import select
 from edgel.view.settings import Run, Settings
 from edgel.view.source import Source
@@ -85,7 +85,7 @@ class Session:
     intrinsics : path, optional
         The camera of depth images.
     detect : callable
-        As `edgel.view.scale.detect_at_scale`.
+        As `edgel.detect_at_scale`.
     read : callable
         As `edgel.read`.
     """
@@ -205,16 +205,18 @@ class Session:
 
         start = time.perf_counter()
         edges, error = None, ""
-        kinds = DEFAULT_KINDS | EdgeKind.COLOR if run.color else DEFAULT_KINDS
+        options: dict[str, Any] = {}
+        if run.preset == "default":
+            kinds = DEFAULT_KINDS | EdgeKind.COLOR if run.color else DEFAULT_KINDS
+            options = {"kinds": kinds, "min_strength": LEAST_STRENGTH}
         try:
             progress("start")
             edges = self._detect(
                 self.sources[run.source].cloud,
                 run.scale,
                 preset=run.preset,
-                kinds=kinds,
-                min_strength=LEAST_STRENGTH,
                 progress=progress,
+                **options,
             )
         except Superseded:
             return

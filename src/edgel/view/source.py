@@ -13,11 +13,10 @@ import numpy as np
 
 import edgel
 from edgel.camera import Camera, choose_camera
-from edgel.cloud import Cloud, check_points
+from edgel.cloud import Cloud, check_points, in_box
 from edgel.color import color_channels
 from edgel.io.errors import describe_error
-from edgel.view.scale import median_spacing, thin_to
-from edgel.view.select import in_box
+from edgel.scale import median_spacing, thin_to
 from edgel.view.settings import Settings
 
 MAX_SHOWN = 3_000_000  # points that a browser turns without stutter

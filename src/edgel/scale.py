@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 
-import edgel
+from edgel import paper
 from edgel.cloud import as_cloud, check_points
-from edgel.detect import DEFAULT_KINDS, LIKELY
-from edgel.edges import EdgeKind, Edges
+from edgel.detect import detect
+from edgel.edges import Edges
 from edgel.kdtree import build_index
 from edgel.neighbors import knn
+from edgel.stages import Stages
 
 
 def median_spacing(points: Any) -> float:
@@ -101,18 +103,19 @@ def detect_at_scale(
     scale: float = 1.0,
     *,
     preset: Literal["default", "paper"] = "default",
-    kinds: EdgeKind | str | Iterable[str] = DEFAULT_KINDS,
-    min_strength: float = LIKELY,
     progress: Callable[[str], None] | None = None,
+    **options: Any,
 ) -> Edges:
     """Find edges larger than some spacings: `edgel.detect` on the cloud thinned to one point a voxel of that size.
 
     Parameters
     ----------
-    points, preset, kinds, min_strength, progress
-        As for `edgel.detect`; the published method takes neither kinds nor strength.
+    points, preset, progress
+        As for `edgel.detect`.
     scale : float
         Side of the voxels, in median spacings, 1 or more. At 1 the cloud is not thinned.
+    **options
+        Of the preset: those of `edgel.detect`, or of `edgel.paper.detect`.
 
     Returns
     -------
@@ -122,7 +125,7 @@ def detect_at_scale(
     Raises
     ------
     TypeError, ValueError
-        As for `edgel.detect`, and if the scale is below 1.
+        As for the preset's function, and if the scale is below 1.
 
     Examples
     --------
@@ -135,16 +138,18 @@ def detect_at_scale(
     """
     if not (np.isfinite(scale) and scale >= 1):
         raise ValueError(f"scale: expected 1 (all points) or more, in median spacings, got {scale}")
-    cloud = as_cloud(points)
+    find: Callable[..., Edges] = paper.detect if preset == "paper" else partial(detect, preset=preset)
+    cloud, stages = as_cloud(points), Stages(progress)
     if scale == 1:
-        return _detect(cloud, preset, kinds, min_strength, progress)
-    rows = thin(cloud, scale * median_spacing(cloud))
-    edges = _detect(cloud.take(rows), preset, kinds, min_strength, progress)
-    dropped = len(cloud) - len(check_points(cloud).rows)
-    return replace(edges, index=rows[edges.index], num_points=len(cloud), num_dropped=dropped)
-
-
-def _detect(cloud: edgel.Cloud, preset: Any, kinds: Any, min_strength: float, progress: Any) -> Edges:
-    if preset == "paper":
-        return edgel.detect(cloud, preset=preset, progress=progress)
-    return edgel.detect(cloud, kinds=kinds, min_strength=min_strength, progress=progress)
+        return find(cloud, progress=progress, **options)
+    with stages("thinning"):
+        rows = thin(cloud, scale * median_spacing(cloud))
+    edges = find(cloud.take(rows), progress=progress, **options)
+    return replace(
+        edges,
+        index=rows[edges.index],
+        num_points=len(cloud),
+        num_dropped=len(cloud) - len(check_points(cloud).rows),
+        parameters={"scale": float(scale), **edges.parameters},
+        seconds=stages.seconds | dict(edges.seconds),
+    )
