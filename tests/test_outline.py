@@ -149,9 +149,10 @@ def test_kernels_equal_naive():
     kept = np.full(depth.shape, np.nan)
     _held(0, len(depth), depth, close, kept)
     assert np.array_equal(kept, naive.held(depth, close), equal_nan=True)
-    planes = local_planes(depth, np.full(depth.shape, 0.2), np.ones(depth.shape, bool), False, 3)
-    for row, col in np.argwhere(~np.isnan(depth)):
-        assert planes[row, col, :4] == pytest.approx(naive.facet(depth, 0.2, row, col, 3), abs=1e-9)
+    known = np.flatnonzero(~np.isnan(depth))
+    planes = local_planes(depth, np.full(depth.shape, 0.2), known, False, 3)
+    for (row, col), plane in zip(np.argwhere(~np.isnan(depth)), planes, strict=True):
+        assert plane[:4] == pytest.approx(naive.facet(depth, 0.2, row, col, 3), abs=1e-9)
     hole = RNG.random((40, 50)) < 0.7
     assert np.array_equal(beside_void(np.where(hole, np.nan, 1.0)), naive.beside_void(hole))
 

@@ -30,24 +30,14 @@ def noise_level(raster: Raster) -> np.ndarray:
     From second differences, which a plane does not have, by their median over tiles, which steps and outliers hardly
     move.
     """
-    depth = raster.depth
-    # On a plane seen from a viewpoint it is the inverse of the range that is linear in the pixels.
-    flat, scale = (-1 / depth, depth**2) if raster.viewpoint is not None else (depth, np.ones_like(depth))
-    bends = np.full((2, *depth.shape), np.nan)
-    bends[0, 1:-1] = np.abs(flat[:-2] - 2 * flat[1:-1] + flat[2:])
-    bends[1, :, 1:-1] = np.abs(flat[:, :-2] - 2 * flat[:, 1:-1] + flat[:, 2:])
-    rows, cols = (-(-length // _TILE) for length in depth.shape)
-    padded = np.full((rows * _TILE, cols * _TILE), np.nan)
-    padded[: depth.shape[0], : depth.shape[1]] = bends.mean(axis=0) * scale
-    tiles = padded.reshape(rows, _TILE, cols, _TILE).transpose(0, 2, 1, 3).reshape(rows * cols, -1)
-    known = np.isfinite(tiles).sum(axis=1) >= _TILE
-    level = np.zeros(rows * cols)
-    if known.any():
-        level[known] = np.nanmedian(tiles[known], axis=1)
-        level[~known] = np.median(level[known])
+    tiles = tuple(-(-length // _TILE) for length in raster.shape)
+    level = np.empty(tiles)
+    run_slices(_tile_levels, tiles[0], raster.depth, raster.viewpoint is not None, level, size=4)
+    known = ~np.isnan(level)
+    level[~known] = np.median(level[known]) if known.any() else 0.0
     # The median of the mean of two bends, each of deviation sqrt(6) sigma, is 1.85 sigma.
-    level = (level / 1.85).reshape(rows, cols).repeat(_TILE, axis=0).repeat(_TILE, axis=1)
-    return level[: depth.shape[0], : depth.shape[1]]
+    level = (level / 1.85).repeat(_TILE, axis=0)[: raster.shape[0]]
+    return level.repeat(_TILE, axis=1)[:, : raster.shape[1]]
 
 
 def without_lonely(depth: np.ndarray, spacing: np.ndarray, noise: np.ndarray) -> np.ndarray:
@@ -57,23 +47,63 @@ def without_lonely(depth: np.ndarray, spacing: np.ndarray, noise: np.ndarray) ->
     return kept
 
 
-def local_planes(depth: np.ndarray, noise: np.ndarray, wanted: np.ndarray, perspective: bool, reach: int) -> np.ndarray:
-    """Fit a plane to each wanted pixel's own side of whatever edge is near.
+def local_planes(depth: np.ndarray, noise: np.ndarray, pixels: np.ndarray, perspective: bool, reach: int) -> np.ndarray:
+    """Fit a plane to some pixels' own side of whatever edge is near.
+
+    Parameters
+    ----------
+    depth, noise : (H, W) float64
+    pixels : (M,) int64
+        Places in the flat image; their depths are known.
+    perspective : bool
+        Whether the rays leave a viewpoint, else they are parallel.
+    reach : int
+        Of the windows, in pixels.
 
     Returns
     -------
-    (H, W, 5) float64
+    (M, 5) float64
         Depth of the plane at the pixel, its slopes down and right (per pixel), the variance of that depth, and how far
-        noise may take the pixel's own depth from it; NaN where not wanted.
+        noise may take the pixel's own depth from it.
     """
     around = np.arange(-reach, reach + 1)
     dr, dc = (part.ravel() for part in np.meshgrid(around, around, indexing="ij"))
     inside = (dr**2 + dc**2 <= (reach + 0.3) ** 2) & ((dr != 0) | (dc != 0))
     dr, dc = dr[inside], dc[inside]
     sector = np.floor((np.arctan2(dr, dc) / (2 * np.pi) * SECTORS + 1e-9) % SECTORS).astype(np.int64)
-    planes = np.full((*depth.shape, 5), np.nan)
-    run_slices(_planes, len(depth), depth, noise, wanted, perspective, dr, dc, sector, planes, size=16)
+    planes = np.empty((len(pixels), 5))
+    run_slices(_planes, len(pixels), depth, noise, pixels, perspective, dr, dc, sector, planes, size=1024)
     return planes
+
+
+@kernel
+def _tile_levels(start, stop, depth, perspective, level):
+    """Median, over each tile of some rows of tiles, of the mean bend along rows and columns; NaN where few are known."""
+    height, width = depth.shape
+    bends = np.empty(_TILE * _TILE)
+    for i in range(start, stop):
+        for j in range(level.shape[1]):
+            count = 0
+            for row in range(max(i * _TILE, 1), min((i + 1) * _TILE, height - 1)):
+                for col in range(max(j * _TILE, 1), min((j + 1) * _TILE, width - 1)):
+                    own, scale = depth[row, col], 1.0
+                    up, down, left, right = (
+                        depth[row - 1, col],
+                        depth[row + 1, col],
+                        depth[row, col - 1],
+                        depth[row, col + 1],
+                    )
+                    # On a plane seen from a viewpoint it is the inverse of the range that is linear in the pixels.
+                    if perspective:
+                        if own * up * down * left * right == 0.0:
+                            continue
+                        scale = own * own
+                        own, up, down, left, right = -1 / own, -1 / up, -1 / down, -1 / left, -1 / right
+                    bend = (abs(up - 2 * own + down) + abs(left - 2 * own + right)) / 2 * scale
+                    if math.isfinite(bend):
+                        bends[count] = bend
+                        count += 1
+            level[i, j] = np.median(bends[:count]) if count >= _TILE else np.nan
 
 
 @kernel
@@ -132,58 +162,56 @@ def _fit(m):
 
 
 @kernel
-def _planes(start, stop, depth, noise, wanted, perspective, dr, dc, sector, planes):
+def _planes(start, stop, depth, noise, pixels, perspective, dr, dc, sector, planes):
     height, width = depth.shape
     sums, m = np.zeros((2 * SECTORS + 1, 10)), np.zeros(10)
-    for row in range(start, stop):
-        for col in range(width):
-            own = depth[row, col]
-            if math.isnan(own) or not wanted[row, col]:
+    for p in range(start, stop):
+        row, col = pixels[p] // width, pixels[p] % width
+        own = depth[row, col]
+        sums[:] = 0.0
+        for i in range(len(dr)):
+            r, c = row + dr[i], col + dc[i]
+            if r < 0 or r >= height or c < 0 or c >= width or math.isnan(depth[r, c]):
                 continue
-            sums[:] = 0.0
-            for i in range(len(dr)):
-                r, c = row + dr[i], col + dc[i]
-                if r < 0 or r >= height or c < 0 or c >= width or math.isnan(depth[r, c]):
+            x, y = float(dc[i]), float(dr[i])
+            u = depth[r, c] - own
+            if perspective:
+                u *= own / depth[r, c]
+            part = sums[sector[i] + 1]
+            part[0] += 1.0
+            part[1] += x
+            part[2] += y
+            part[3] += x * x
+            part[4] += x * y
+            part[5] += y * y
+            part[6] += u
+            part[7] += x * u
+            part[8] += y * u
+            part[9] += u * u
+        for k in range(SECTORS):
+            for j in range(10):
+                sums[SECTORS + 1 + k, j] = sums[1 + k, j]
+        for k in range(1, 2 * SECTORS + 1):
+            for j in range(10):
+                sums[k, j] += sums[k - 1, j]
+        best = np.inf
+        variance = noise[row, col] ** 2
+        out = planes[p]
+        out[0], out[1], out[2], out[3], out[4] = own, 0.0, 0.0, variance, 0.0
+        for w in range(len(WINDOWS)):
+            size = WINDOWS[w]
+            for k in range(1 if size == SECTORS else SECTORS):
+                for j in range(10):
+                    m[j] = sums[k + size, j] - sums[k, j]
+                m[0] += 1.0
+                v, a, b, rest, leverage = _fit(m)
+                if rest == np.inf:
                     continue
-                x, y = float(dc[i]), float(dr[i])
-                u = depth[r, c] - own
-                if perspective:
-                    u *= own / depth[r, c]
-                part = sums[sector[i] + 1]
-                part[0] += 1.0
-                part[1] += x
-                part[2] += y
-                part[3] += x * x
-                part[4] += x * y
-                part[5] += y * y
-                part[6] += u
-                part[7] += x * u
-                part[8] += y * u
-                part[9] += u * u
-            for k in range(SECTORS):
-                for j in range(10):
-                    sums[SECTORS + 1 + k, j] = sums[1 + k, j]
-            for k in range(1, 2 * SECTORS + 1):
-                for j in range(10):
-                    sums[k, j] += sums[k - 1, j]
-            best = np.inf
-            variance = noise[row, col] ** 2
-            out = planes[row, col]
-            out[0], out[1], out[2], out[3], out[4] = own, 0.0, 0.0, variance, 0.0
-            for w in range(len(WINDOWS)):
-                size = WINDOWS[w]
-                for k in range(1 if size == SECTORS else SECTORS):
-                    for j in range(10):
-                        m[j] = sums[k + size, j] - sums[k, j]
-                    m[0] += 1.0
-                    v, a, b, rest, leverage = _fit(m)
-                    if rest == np.inf:
-                        continue
-                    spread = max((rest + _PRIOR * variance) / (m[0] - 3 + _PRIOR), variance)
-                    # The pixel's own misfit counts once more, or it might take the plane of the other side.
-                    score = spread * (1 + PREFER[w] + leverage) + v * v / 4
-                    if score < best:
-                        best = score
-                        out[0], out[1], out[2], out[3] = own + v, a, b, spread * leverage
-                        # By how much the pixel itself pulls its plane, it stays closer to it than others would.
-                        out[4] = _STRAY_SIGMAS * math.sqrt(variance) * (1 - leverage)
+                spread = max((rest + _PRIOR * variance) / (m[0] - 3 + _PRIOR), variance)
+                # The pixel's own misfit counts once more, or it might take the plane of the other side.
+                score = spread * (1 + PREFER[w] + leverage) + v * v / 4
+                if score < best:
+                    best = score
+                    out[0], out[1], out[2], out[3] = own + v, a, b, spread * leverage
+                    # By how much the pixel itself pulls its plane, it stays closer to it than others would.
+                    out[4] = _STRAY_SIGMAS * math.sqrt(variance) * (1 - leverage)

@@ -65,26 +65,7 @@ def outline_kinds(raster: Raster, xyz: np.ndarray) -> Outline:
     >>> [sorted(set(stair[(found.kind & side) > 0, 0].tolist())) for side in (EdgeKind.OCCLUDING, EdgeKind.OCCLUDED)]
     [[14.0], [15.0]]
     """
-    perspective = raster.viewpoint is not None
-    spacing = raster.spacing
-    noise = np.fmax(noise_level(raster), FINEST * spacing)
-    depth = without_lonely(raster.depth, spacing, noise)
-    rim = beside_void(raster.depth) & ~np.isnan(depth)
-    # Noise is averaged over as few pixels as it allows: edges are seldom straight for long.
-    known = ~np.isnan(spacing)
-    level = float(np.median(noise[known] / spacing[known])) if known.any() else 0.0
-    reach = 3 if level < 0.15 else 4 if level < 0.5 else 5
-    wanted = beside_gap(depth, LEAST_GAP * spacing)
-    planes = local_planes(depth, noise, wanted, perspective, reach)
-    astray = np.abs(raster.depth - planes[..., 0]) > planes[..., 4] + STRAY * spacing
-    depth = np.where(astray, np.nan, depth)
-    touched = astray
-    for _ in range(2 * reach):  # as far as any window reaches
-        touched = _widened(touched)
-    again = touched & beside_gap(depth, LEAST_GAP * spacing)
-    planes[again] = local_planes(depth, noise, again, perspective, reach)[again]
-    least = np.maximum(STEP * spacing, LEVELS * _by_pixel(raster, level_gaps(xyz, raster.direction)))
-    step, side = depth_steps(depth, planes, spacing, least, perspective)
+    step, side, rim, reach = _steps_and_rims(raster, xyz)
     level = levels(step, WEAK, CHAIN * reach)
     kind = np.where(level > 0, side, 0) | np.where(rim, EdgeKind.BOUNDARY, 0)
     strength = np.where(rim, 1.0, level / (1 + level))
@@ -92,6 +73,36 @@ def outline_kinds(raster: Raster, xyz: np.ndarray) -> Outline:
     flags, strengths = np.zeros(len(xyz), np.uint8), np.zeros(len(xyz))
     flags[raster.index[shown]], strengths[raster.index[shown]] = kind[shown], strength[shown]
     return Outline(flags, strengths)
+
+
+def _steps_and_rims(raster: Raster, xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """What `depth_steps` says of all pixels, which lie beside a void, and the reach of the windows of the planes."""
+    perspective = raster.viewpoint is not None
+    rounding = LEVELS * _by_pixel(raster, level_gaps(xyz, raster.direction))
+    spacing = raster.spacing
+    least = np.maximum(STEP * spacing, rounding)
+    noise = np.fmax(noise_level(raster), FINEST * spacing)
+    depth = without_lonely(raster.depth, spacing, noise)
+    rim = beside_void(raster.depth) & ~np.isnan(depth)
+    # Noise is averaged over as few pixels as it allows: edges are seldom straight for long.
+    known = ~np.isnan(spacing)
+    level = float(np.median(noise[known] / spacing[known])) if known.any() else 0.0
+    reach = 3 if level < 0.15 else 4 if level < 0.5 else 5
+    wanted = np.flatnonzero(beside_gap(depth, LEAST_GAP * spacing))
+    planes = local_planes(depth, noise, wanted, perspective, reach)
+    astray = np.zeros(depth.shape, bool)
+    off = np.abs(depth.ravel()[wanted] - planes[:, 0])
+    astray.ravel()[wanted] = off > planes[:, 4] + STRAY * spacing.ravel()[wanted]
+    depth[astray] = np.nan
+    touched = astray
+    for _ in range(2 * reach):  # as far as any window reaches
+        touched = _widened(touched)
+    again = np.flatnonzero(touched & beside_gap(depth, LEAST_GAP * spacing))
+    planes = np.concatenate([planes, local_planes(depth, noise, again, perspective, reach)])
+    latest = np.full(depth.shape, -1, np.int32)
+    latest.ravel()[np.concatenate([wanted, again])] = np.arange(len(planes))
+    step, side = depth_steps(depth, latest, planes, spacing, least, perspective)
+    return step, side, rim, reach
 
 
 def level_gaps(xyz: np.ndarray, direction: np.ndarray) -> np.ndarray:
@@ -116,9 +127,14 @@ def _by_pixel(raster: Raster, values: np.ndarray) -> np.ndarray:
 
 
 def depth_steps(
-    depth: np.ndarray, planes: np.ndarray, spacing: np.ndarray, least: np.ndarray, perspective: bool
+    depth: np.ndarray,
+    which: np.ndarray,
+    planes: np.ndarray,
+    spacing: np.ndarray,
+    least: np.ndarray,
+    perspective: bool,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Compare each pixel's plane with those of its 4 neighbours.
+    """Compare each pixel's plane, that of number `which` (H, W; -1: none), with those of its 4 neighbours.
 
     Returns
     -------
@@ -128,7 +144,7 @@ def depth_steps(
         `EdgeKind` flag of the side that the pixel lies on.
     """
     step, side = np.zeros(depth.shape), np.zeros(depth.shape, np.uint8)
-    run_slices(_steps, len(depth), depth, planes, spacing, least, perspective, step, side, size=32)
+    run_slices(_steps, len(depth), depth, which, planes, spacing, least, perspective, step, side, size=32)
     return step, side
 
 
@@ -176,23 +192,23 @@ def _widened(mask: np.ndarray) -> np.ndarray:
 
 
 @kernel
-def _steps(start, stop, depth, planes, spacing, least, perspective, step, side):
+def _steps(start, stop, depth, which, planes, spacing, least, perspective, step, side):
     height, width = depth.shape
     for row in range(start, stop):
         for col in range(width):
             own = depth[row, col]
-            if math.isnan(own):
+            if math.isnan(own) or which[row, col] < 0:
                 continue
-            p = planes[row, col]
+            p = planes[which[row, col]]
             for way in range(4):
                 dr, dc = (0, 1, 0, -1)[way], (1, 0, -1, 0)[way]
                 apart = 1
                 r, c = row + dr, col + dc
                 while apart <= BRIDGE and 0 <= r < height and 0 <= c < width and math.isnan(depth[r, c]):
                     r, c, apart = r + dr, c + dc, apart + 1
-                if not (0 <= r < height and 0 <= c < width) or math.isnan(depth[r, c]):
+                if not (0 <= r < height and 0 <= c < width) or math.isnan(depth[r, c]) or which[r, c] < 0:
                     continue
-                q = planes[r, c]
+                q = planes[which[r, c]]
                 here = apart * (p[1] * dr + p[2] * dc)
                 there = -apart * (q[1] * dr + q[2] * dc)
                 if perspective:

@@ -123,8 +123,8 @@ def orthographic(xyz: np.ndarray, direction: np.ndarray) -> Raster:
     ((28, 38), 600)
     """
     right, down, forward = _axes(direction, np.array([0.0, 0.0, 1.0]))
-    centred = xyz - xyz.mean(axis=0)  # far from the origin the image's coordinates would lose their digits
-    picture = np.column_stack([centred @ right, centred @ down])
+    middle = xyz.mean(axis=0)  # far from the origin the image's coordinates would lose their digits
+    picture = (xyz - middle) @ np.column_stack([right, down])
     return _rastered(xyz, picture, xyz @ forward, "orthographic", None, forward)
 
 
@@ -213,10 +213,10 @@ def image_pitch(picture: np.ndarray) -> tuple[float, float]:
         Place of each point: right, down.
     """
     extent = np.ptp(picture, axis=0)
-    flat = np.column_stack([picture, np.zeros(len(picture))])
     if len(picture) < 2 or not extent.any():
         return 1.0, 1.0
     side = float(np.sqrt(_covered(picture) / len(picture)))
+    flat = np.column_stack([picture, np.zeros(len(picture))])
     index = build_index(flat)
     # Every n-th point of the sorted tree: a sample that lies evenly and does not depend on the order of the input.
     rows = index.order[:: max(len(index) // _SAMPLE, 1)]
@@ -245,8 +245,8 @@ def _covered(picture: np.ndarray) -> float:
     area = float(extent.prod()) or float(extent.max()) ** 2 / len(picture)
     for _ in range(4):  # a cloud that covers little of its box has more points in a cell, so cells may shrink
         cell = np.sqrt(8 * area / len(picture))
-        places = np.floor((picture - low) / cell).astype(np.int64)
-        counts = np.unique(places[:, 1] * (places[:, 0].max() + 1) + places[:, 0], return_counts=True)[1]
+        column, row = (np.floor((picture[:, axis] - low[axis]) / cell).astype(np.int64) for axis in (0, 1))
+        counts = np.unique(row * (column.max() + 1) + column, return_counts=True)[1]
         area = float(len(counts) * cell**2)
         # Cells on the rim are only half full.
         area *= float(np.mean(np.minimum(counts / np.median(counts), 1.0)))
