@@ -78,7 +78,7 @@ def local_planes(depth: np.ndarray, noise: np.ndarray, pixels: np.ndarray, persp
 
 @kernel
 def _tile_levels(start, stop, depth, perspective, level):
-    """Median, over each tile of some rows of tiles, of the mean bend along rows and columns; NaN where few are known."""
+    """Median, over each tile of some rows of tiles, of the bends along rows and columns; NaN where few are known."""
     height, width = depth.shape
     bends = np.empty(_TILE * _TILE)
     for i in range(start, stop):
