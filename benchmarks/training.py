@@ -18,8 +18,8 @@ OUTLINE = int(EdgeKind.BOUNDARY | EdgeKind.OCCLUDING | EdgeKind.OCCLUDED)
 MIN_TURN = np.radians(25.0)
 
 
-RELIEFS = 0.14  # share of the examples
-IN_STEPS = 0.3  # share of the views that are those of a depth camera
+RELIEFS = 0.1  # share of the examples
+IN_STEPS = 0.4  # share of the views that are those of a depth camera
 
 
 @dataclass(frozen=True, eq=False)
