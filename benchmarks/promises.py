@@ -26,7 +26,7 @@ from edgel.synth import Solid
 
 K = 16
 PART_POINTS = 1_000_000
-VCM_POINTS = 30_000  # CGAL's takes as long for each of more points, and minutes for all
+VCM_POINTS = 100_000  # CGAL's takes minutes for all, and no less for each of more points
 ONE_EACH = ("projection", "canny", "back-projection")
 Row = dict[str, Any]
 
