@@ -29,7 +29,7 @@ NUM_COSTLY = (
 )
 NUM_ALL = NUM_COSTLY + 2 * context.NUM_FEATURES
 WEIGHTS = "weights.npz"
-COARSE = 0.01  # least probability of an edge in a leaf, by a glance at it, for looking at its points at all
+COARSE = 0.05  # least probability of an edge in a leaf, by a glance at it, for looking at its points at all
 SCREEN = 0.04  # least probability of an edge, from the cheap evidence, for a closer look
 SECOND = 0.02  # and from the costly evidence, for a second one
 MAX_AWAY = 1.5  # spacings: a line farther from the point is not its edge
