@@ -79,7 +79,7 @@ def read_forests(file: str | IO[bytes]) -> dict[str, Forest]:
 def evaluate(forest: Forest, features: np.ndarray) -> np.ndarray:
     """Return the probability (N,) float64 that the forest gives each row of features (N, F) float32."""
     result = np.empty(len(features))
-    run_slices(_evaluate, len(features), features, forest.in_step, result)
+    run_slices(_evaluate, len(features), features, forest.in_step, result, size=512)
     return result
 
 
