@@ -157,6 +157,19 @@ def test_detect_kinds_and_method(scan, tmp_path):
     assert "red, green and blue" in run("detect", scan, "--kinds", "color").stderr
 
 
+def test_detect_at_a_scale_of_sharp_creases_in_a_box(scan, tmp_path):
+    words = ("--scale", "2", "--min-angle", "20", "--crop", "-inf", "-inf", "-inf", "inf", "0.5", "inf")
+    result = run("detect", scan, "-o", tmp_path / "edges.npz", "--json", *words)
+    assert result.exit_code == 0
+    cloud = io.read(scan)
+    expected = edgel.detect_at_scale(cloud, 2.0).drop_blunt(np.radians(20))
+    expected = expected.take(cloud.xyz[expected.index, 1] <= 0.5)
+    assert np.array_equal(io.read(tmp_path / "edges.npz").attributes["label"], expected.index)
+    told = json.loads(result.stdout)
+    assert (told["points"], told["edge_points"]) == (len(cloud), len(expected))
+    assert told["parameters"]["scale"] == 2
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [

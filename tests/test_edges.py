@@ -56,6 +56,16 @@ def test_counts_and_shares():
     assert repr(edges) == "Edges(3 of 5 points, 75.0%, 1 not finite; preset default, method surface)"
 
 
+def test_those_inside_a_box():
+    edges, cloud = edges_of_three(), cloud_of_five()
+    low, high = [-np.inf, 5_000_000.25, -np.inf], [500_001, np.inf, np.inf]
+    np.testing.assert_array_equal(edges.inside(cloud, [low, high]).index, [1])  # on two faces of the box
+    assert len(edges.inside(cloud, [[-np.inf] * 3, [np.inf] * 3])) == 3
+    for none in ([high, low], [0, 1], [[np.nan] * 3, high]):
+        with pytest.raises(ValueError, match="box: expected a lower and an upper corner"):
+            edges.inside(cloud, none)
+
+
 def test_only_some_kinds():
     edges = edges_of_three()
     assert edges.only(["boundary", "occluded", "crease"]) is edges

@@ -123,4 +123,5 @@ def _vector(values: np.ndarray, digits: int = 6) -> str:
     """Write coordinates with enough digits for those of maps, directions with few."""
     if np.isnan(values).any():
         return "unknown"
-    return " ".join(f"{value:.{digits}f}" if digits < 6 else f"{value:.9g}" for value in values)
+    # "z": no -0.000, a direction that rounds to an axis lies along it
+    return " ".join(f"{value:z.{digits}f}" if digits < 6 else f"{value:z.9g}" for value in values)

@@ -133,7 +133,7 @@ class Source:
             xyz = cloud.xyz[rows]
             self.spacing = median_spacing(xyz)
             self.few = thin_to(xyz, FEW, self.spacing)
-            self._few_spacing = self.spacing if len(self.few) == len(rows) else median_spacing(xyz[self.few])
+            self._few_spacing = self.spacing * float(np.sqrt(len(rows) / len(self.few)))
             self.camera = choose_camera(cloud, "auto")
             self.low, self.high = reach(xyz)
             self.cloud = cloud
