@@ -25,14 +25,13 @@ REMARKS = {
     "`interesting.las`, the COPC and the UTM file are a thousand points spread over a town, several spacings "
     "to the next house: nothing to find.",
     "kinect_objects": "Depth quantised to steps of some millimetres: the default shows the outlines of the boxes and both sides "
-    "of their shadows, and short false creases all over the table where the steps are. The paper marks the "
+    "of their shadows, and a few short false creases on the table where the steps are. The paper marks the "
     "outlines as wide bands and nothing inside.",
     "kinect_organized": "As above. `organized_edge_1` is a rendered, noise-free frame: there the default finds the outlines and "
     "the folds. The paper finds the outlines only.",
     "lidar_sweeps": "The default knows the spinning sensor by its 32 rings and sees the sweep as it did: near and far sides "
     "of depth steps, and the end of the ground about the car. Creases between rings are mostly false: a "
-    "ring's neighbours lie on the ring. It takes 12 s, since thousands of shots without an echo lie at one "
-    "place, the origin. For the paper every pixel beside a ring is an edge.",
+    "ring's neighbours lie on the ring. For the paper every pixel beside a ring is an edge.",
     "roofs": "About a thousand points a roof. The default finds most of the eaves and parts of the ridges, with gaps. "
     "The paper's image is 8 pixels wide.",
     "scan_vs_mesh": "The scans (`.npy`) have noise of one spacing: what the default finds is scattered at random, the paper "
