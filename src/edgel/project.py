@@ -216,7 +216,11 @@ def _grown(pixels: np.ndarray, across: int, along: int) -> np.ndarray:
 
 def _summed(values: np.ndarray) -> np.ndarray:
     """Summed-area table with a leading row and column of zeros: any window's sum from four of its entries."""
-    return np.pad(values.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
+    sums = np.zeros((values.shape[0] + 1, values.shape[1] + 1), values.dtype)
+    inner = sums[1:, 1:]
+    np.cumsum(values, axis=0, out=inner)
+    np.cumsum(inner, axis=1, out=inner)
+    return sums
 
 
 @part
