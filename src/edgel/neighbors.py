@@ -18,7 +18,7 @@ from edgel.lanes import LANES, as_floats, bits, counted, counts_of, load, store
 from edgel.parallel import kernel, part, run_slices
 from edgel.search import first_of, nearest_of_eight
 
-_SLICE = 4096  # queries whose neighbours exist at a time, for each thread
+_SLICE = 1024  # queries whose neighbours exist at a time, for each thread
 
 
 @dataclass(frozen=True, eq=False)
