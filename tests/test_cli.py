@@ -449,6 +449,7 @@ def test_output_that_a_format_cannot_hold(tmp_path):
         ["--num-neighbors", "many"],
         ["--scale", "0.5"],
         [*PAPER, "--min-angle", "30"],
+        ["--min-angle", "-1"],
         ["--crop", "1", "0", "0", "0", "1", "1"],
         ["--crop", "0", "0", "0", "1", "1", "nan"],
         ["--unknown"],

@@ -82,7 +82,8 @@ def detect(
         ),
     ] = None,
     min_angle: Annotated[
-        float | None, typer.Option(metavar="DEGREES", help="Leave out creases whose faces turn less than this.")
+        float | None,
+        typer.Option(min=0, max=180, metavar="DEGREES", help="Leave out creases whose faces turn less than this."),
     ] = None,
     crop: Annotated[
         tuple[float, float, float, float, float, float] | None,
@@ -130,6 +131,8 @@ def detect(
         check_outputs(output, report, label_all=label_all, as_json=as_json)
         if preset == "paper" and min_angle is not None:
             raise Failure(ExitCode.USAGE, "--min-angle: the paper preset tells no creases apart; leave it out")
+        if crop is not None and not all(low <= high for low, high in zip(crop[:3], crop[3:], strict=True)):
+            raise Failure(ExitCode.USAGE, f"--crop: the first corner must be the lower one, got {crop}")
         files.check_input(source, intrinsics)
         with Watch() as watch:
             stages = Stages(watch)
@@ -198,12 +201,7 @@ def choose(cloud: edgel.Cloud, edges: Edges, min_angle: float | None, crop: Sequ
     """Return the edge points that are sharp enough, the angle in degrees, and inside a box, corner after corner."""
     if min_angle is not None:
         edges = edges.drop_blunt(math.radians(min_angle))
-    if crop is not None:
-        try:
-            edges = edges.inside(cloud, [crop[:3], crop[3:]])
-        except ValueError as error:
-            raise Failure(ExitCode.USAGE, f"--crop: the first corner must be the lower one, got {crop}") from error
-    return edges
+    return edges if crop is None else edges.inside(cloud, [crop[:3], crop[3:]])
 
 
 def check_outputs(output: str | None, report: str | None, *, label_all: bool, as_json: bool) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import textwrap
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -97,8 +98,11 @@ def figure_image(content: Content) -> FigureImage:
         _compose(content, [panel.image(background) for panel in content.panels], SHEETS[background])
         for background in ("light", "dark")
     )
-    captioned = _encoded(_with_caption(light, content.caption, SHEETS["light"]), format="PNG")
-    return FigureImage(content.number, content.caption, captioned, _encoded(light, **_SMALL), _encoded(dark, **_SMALL))
+    captioned = _with_caption(light, content.caption, SHEETS["light"])
+    forms = ((captioned, {"format": "PNG"}), (light, _SMALL), (dark, _SMALL))
+    with ThreadPoolExecutor(len(forms)) as pool:  # packing takes as long as drawing
+        files = pool.map(lambda image, form: _encoded(image, **form), *zip(*forms, strict=True))
+        return FigureImage(content.number, content.caption, *files)
 
 
 def _encoded(image: Image.Image, **form: Any) -> bytes:
