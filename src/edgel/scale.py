@@ -17,9 +17,12 @@ from edgel.kdtree import build_index
 from edgel.neighbors import knn
 from edgel.stages import Stages
 
+_SAMPLE = 20_000  # points whose nearest neighbours are looked for
+_MOST_CELLS = 2.0**52  # that a float64 tells apart
+
 
 def median_spacing(points: Any) -> float:
-    """Return the median distance of the points to their nearest neighbour, in the cloud's unit.
+    """Return the median distance of points to their nearest neighbour, in the cloud's unit; of many points a sample.
 
     Points at the very place of another do not count; 0 where all are.
 
@@ -30,8 +33,8 @@ def median_spacing(points: Any) -> float:
     >>> median_spacing(np.c_[x.ravel(), y.ravel(), 0 * x.ravel()])
     1.0
     """
-    xyz = check_points(points).xyz
-    nearest = knn(build_index(xyz), xyz, 2).distances[:, 1]
+    index = build_index(check_points(points).xyz)
+    nearest = knn(index, index.at(np.arange(0, len(index), max(len(index) // _SAMPLE, 1))), 2).distances[:, 1]
     nearest = nearest[nearest > 0]
     return float(np.median(nearest)) if len(nearest) else 0.0
 
@@ -67,17 +70,29 @@ def thin(points: Any, size: float) -> np.ndarray:
     xyz = checked.xyz
     place = (xyz - xyz.min(axis=0)) / size
     cell = np.floor(place)
-    voxel = np.zeros(len(xyz), np.int64)
-    for axis in range(3):  # numbered anew each time, so that the numbers stay small
-        _, along = np.unique(cell[:, axis], return_inverse=True)
-        _, voxel = np.unique(voxel * (along.max() + 1) + along, return_inverse=True)
+    voxel = _voxels(cell)
     away = ((place - cell - 0.5) ** 2).sum(axis=1)
     least = np.full(voxel.max() + 1, np.inf)
     np.minimum.at(least, voxel, away)
     best = np.flatnonzero(away <= least[voxel])
-    order = best[np.lexsort((best, xyz[best, 2], xyz[best, 1], xyz[best, 0], voxel[best]))]
+    shared = np.bincount(voxel[best])[voxel[best]] > 1
+    alone, tied = best[~shared], best[shared]
+    order = tied[np.lexsort((tied, xyz[tied, 2], xyz[tied, 1], xyz[tied, 0], voxel[tied]))]
     _, first = np.unique(voxel[order], return_index=True)
-    return checked.rows[np.sort(order[first])]
+    return checked.rows[np.sort(np.concatenate([alone, order[first]]))]
+
+
+def _voxels(cell: np.ndarray) -> np.ndarray:
+    """Number the voxels that are occupied, of each point's cell along the axes (N, 3), at least 0; (N,) int64."""
+    counts = cell.max(axis=0) + 1
+    if counts.prod() < _MOST_CELLS:
+        along = cell @ np.array([counts[1] * counts[2], counts[2], 1.0])
+    else:  # numbered anew axis by axis, so that the numbers stay small
+        along = np.zeros(len(cell), np.int64)
+        for axis in range(3):
+            _, places = np.unique(cell[:, axis], return_inverse=True)
+            _, along = np.unique(along * (places.max() + 1) + places, return_inverse=True)
+    return np.unique(along, return_inverse=True)[1]
 
 
 def thin_to(xyz: np.ndarray, number: int, spacing: float) -> np.ndarray:
