@@ -53,7 +53,8 @@ def legend(panes: Sequence[Pane], settings: Settings) -> str:
         return f"<div style='{_BOX}'>{bar}<span>weak</span><span style='float:right'>strong</span></div>"
     rows = []
     if len(found) > 1:
-        names = "".join(f"<td style='{_NUMBER};{_NOTE}'>{escape(pane.name)}</td>" for pane in found)
+        style = f"{_NUMBER};{_NOTE};overflow-wrap:normal"
+        names = "".join(f"<td style='{style}'>{escape(pane.name)}</td>" for pane in found)
         rows.append(f"<tr><td></td><td></td>{names}</tr>")
     for kind, color in KIND_COLORS.items():
         counts = [_count(pane, kind) for pane in found]
