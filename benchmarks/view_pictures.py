@@ -46,7 +46,9 @@ def shoot(browser: Any, name: str, folder: Path, files: list[str], act: Callable
         picture_of_page = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
         page.close()
     # 256 colors, the most different ones, and a third of the size.
-    picture_of_page.quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(DOCS / f"{name}.png", optimize=True)
+    picture_of_page.quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(
+        DOCS / f"{name}.png", optimize=True
+    )
     print(DOCS / f"{name}.png", flush=True)
 
 
