@@ -65,6 +65,8 @@ def test_bad_arrays(tmp_path):
         np.zeros((2, 2, 2)),
         np.zeros((3, 3), complex),
         np.zeros((2, 2), "i4,i4"),
+        np.zeros(4, [("x", "f8"), ("y", "V8"), ("z", "f8")]),
+        np.zeros(4, [("x", "f8", 2), ("y", "f8"), ("z", "f8")]),
     ):
         np.save(file, array)
         with pytest.raises(FormatError):

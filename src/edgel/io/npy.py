@@ -61,12 +61,12 @@ def _cloud_of(path: str, array: np.ndarray) -> Cloud:
     shape = array.shape[:2] if array.ndim == 3 or (array.ndim == 2 and array.dtype.names) else None
     if array.dtype.names:
         axes = find_xyz(array.dtype.names)
-        if axes is None or array.ndim not in (1, 2):
+        if axes is None or array.ndim not in (1, 2) or any(array.dtype[axis].shape for axis in axes):
             raise FormatError(
                 f"{path}: records of {', '.join(array.dtype.names)}, shape {array.shape}; x, y and z are needed"
             )
         flat = array.reshape(-1)
-        xyz = _numbers(path, np.column_stack([flat[axis] for axis in axes]))
+        xyz = np.column_stack([_numbers(path, flat[axis]) for axis in axes])
         rest = {name: np.ascontiguousarray(flat[name]) for name in array.dtype.names if name not in axes}
         return Cloud(xyz, rest, shape)
     if array.ndim == 3 and array.shape[2] == 3:
