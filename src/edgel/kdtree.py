@@ -49,6 +49,10 @@ class NeighborIndex:
         """Return the sorted points at some places (M,), (M, 3) float64."""
         return np.ascontiguousarray(self.xyz[:, places].T)
 
+    def strewn(self, number: int) -> np.ndarray:
+        """Return places of about `number` points that lie evenly among all, whatever the order of the input."""
+        return np.arange(0, len(self), max(len(self) // number, 1))
+
 
 def build_index(xyz: np.ndarray) -> NeighborIndex:
     """Sort points for neighbour queries.

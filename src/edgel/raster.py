@@ -218,8 +218,7 @@ def image_pitch(picture: np.ndarray) -> tuple[float, float]:
     side = float(np.sqrt(_covered(picture) / len(picture)))
     flat = np.column_stack([picture, np.zeros(len(picture))])
     index = build_index(flat)
-    # Every n-th point of the sorted tree: a sample that lies evenly and does not depend on the order of the input.
-    rows = index.order[:: max(len(index) // _SAMPLE, 1)]
+    rows = index.order[index.strewn(_SAMPLE)]
     near = knn(index, np.ascontiguousarray(flat[rows]), min(9, len(flat)))
     # The nearest that is elsewhere: clouds repeat points.
     elsewhere = near.distances > 1e-6 * side

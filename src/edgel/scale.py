@@ -34,7 +34,7 @@ def median_spacing(points: Any) -> float:
     1.0
     """
     index = build_index(check_points(points).xyz)
-    nearest = knn(index, index.at(np.arange(0, len(index), max(len(index) // _SAMPLE, 1))), 2).distances[:, 1]
+    nearest = knn(index, index.at(index.strewn(_SAMPLE)), 2).distances[:, 1]
     nearest = nearest[nearest > 0]
     return float(np.median(nearest)) if len(nearest) else 0.0
 

@@ -155,7 +155,7 @@ def look(
     if viewing.raster is not None or viewing.method == "surface":
         return viewing
     if viewing.method == "orthographic":
-        sample = index.at(np.arange(0, len(index), max(len(index) // _SAMPLE, 1)))
+        sample = index.at(index.strewn(_SAMPLE))
         raster = orthographic(xyz, _best_direction(xyz, sample, viewpoint))
     elif viewing.method == "organized":
         if cloud.shape is None or min(cloud.shape) < 2:

@@ -165,7 +165,7 @@ def census(index: NeighborIndex) -> tuple[np.ndarray, bool]:
 
     From quantiles of the cheap evidence of points strewn over it; it has a surface if any neighbourhood spans a plane.
     """
-    features = describe(index, np.arange(0, len(index), max(len(index) // _CENSUS, 1)))
+    features = describe(index, index.strewn(_CENSUS))
     bent, small, nearest, row_like = (features[:, i] for i in (12, 0, scales.NUM_FEATURES - 2, 1))
     cloud = np.concatenate(
         [np.quantile(bent, [0.1, 0.5, 0.9]), np.quantile(small, [0.1, 0.5]), np.quantile(nearest, [0.1, 0.5])]
