@@ -1,6 +1,6 @@
 """What edgel promises of its speed, measured: ratios to others in interleaved rounds of one run, processes, files.
 
-Run: python benchmarks/promises.py (part of make bench; five minutes). Prints a table in Markdown.
+Run: python benchmarks/promises.py (part of make bench; three minutes). Prints a table in Markdown.
 """
 
 from __future__ import annotations

@@ -99,7 +99,7 @@ def seconds(work: Callable[[], object], threads: int) -> float:
 
 
 def run(num_points: int, rounds: int) -> list[dict[str, Any]]:
-    """Measure all stages with one and two threads; the first row is the copy, which has no stage's figures."""
+    """Measure all stages with one and two threads, and beside each what a copy moves."""
     before = os.environ.get("EDGEL_NUM_THREADS")
     points = synth.scan(synth.tee(), num_points=num_points).cloud.xyz
     source = np.zeros(max(32_000_000, points.size))
