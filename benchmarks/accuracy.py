@@ -142,7 +142,7 @@ def by_angle(scene: Scene, rows: np.ndarray, tolerance: float = 1.0) -> dict[str
     if len(placed) == 0 or len(edges.positions) == 0:
         return {"hits": [0] * size, "found": [0] * size, "reached": [0] * size, "true": counts(bins)}
     near = metrics.nearest(placed, edges.positions)
-    which, hit = bins[near.rows[:, 0]], near.distances[:, 0] <= reach
+    which, hit = bins[near.points[:, 0]], near.distances[:, 0] <= reach
     back = metrics.nearest(edges.positions, placed).distances[:, 0] <= reach
     return {"hits": counts(which[hit]), "found": counts(which), "reached": counts(bins[back]), "true": counts(bins)}
 

@@ -8,7 +8,7 @@ import time
 import numpy as np
 
 from edgel import paper, synth
-from edgel.canny import gaussian_kernel
+from edgel.paper.canny import gaussian_kernel
 
 EQ_9 = np.array(
     [

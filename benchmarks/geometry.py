@@ -62,7 +62,7 @@ def errors(found: edgel.Edges, true: Any, spacing: float) -> dict[str, float]:
     """Median errors of the found creases against the nearest true one: spacings and degrees."""
     nearest = metrics.nearest(found.position, true.positions)
     here = nearest.distances[:, 0] < REACH * spacing
-    found, true = found.take(here), true.take(nearest.rows[here, 0])
+    found, true = found.take(here), true.take(nearest.points[here, 0])
     off = found.position - true.positions
     off -= (off * true.tangents).sum(axis=1, keepdims=True) * true.tangents
     straight, crossed = (

@@ -8,9 +8,9 @@ from itertools import product
 import numpy as np
 
 from edgel import paper, synth
-from edgel.kdtree import build_index
-from edgel.neighbors import knn
-from edgel.project import occupied_spacing
+from edgel._neighbors.kdtree import build_index
+from edgel._neighbors.knn import knn
+from edgel.paper.projection import occupied_spacing
 
 
 def flat(points: np.ndarray) -> np.ndarray:

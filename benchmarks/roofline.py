@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 
 from edgel import evidence, paper, synth
-from edgel.kdtree import _SHARED_LEVELS, bounds, build_index
-from edgel.neighbors import visit_neighbors
-from edgel.normals import by_offset, fit_planes
-from edgel.parallel import kernel, run_slices
-from edgel.project import back_project, grey_image, occupied_spacing, points_near, project
+from edgel._neighbors.kdtree import _SHARED_LEVELS, bounds, build_index
+from edgel._neighbors.knn import visit_neighbors
+from edgel._neighbors.normals import by_offset, fit_planes
+from edgel._kernels.parallel import kernel, run_slices
+from edgel.paper.projection import back_project, grey_image, occupied_spacing, points_near, project
 
 K = 16
 CANDIDATES = 94  # points whose distance a query measures, the blocks of eight within its reach

@@ -11,7 +11,7 @@ from rivals import NORMALS, RIVALS
 
 import edgel
 from edgel import synth
-from edgel.kdtree import build_index
+from edgel._neighbors.kdtree import build_index
 
 ROUNDS = 5
 SLOWEST = 20.0  # seconds: what would take longer at the next size, growing with the points, is not tried there

@@ -17,12 +17,12 @@ import pytest
 
 import edgel
 from edgel import paper, synth
-from edgel.canny import canny
+from edgel.paper.canny import canny
 from edgel.io import ply
-from edgel.kdtree import bounds, build_index
-from edgel.neighbors import knn
-from edgel.normals import fit_planes
-from edgel.project import back_project, project
+from edgel._neighbors.kdtree import bounds, build_index
+from edgel._neighbors.knn import knn
+from edgel._neighbors.normals import fit_planes
+from edgel.paper.projection import back_project, project
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def test_index(benchmark: Any, points: np.ndarray) -> None:
 @pytest.mark.parametrize("k", [8, 16, 32])
 def test_knn(benchmark: Any, points: np.ndarray, k: int) -> None:
     index = build_index(points)
-    assert benchmark(knn, index, points, k).rows.shape == (len(points), k)
+    assert benchmark(knn, index, points, k).points.shape == (len(points), k)
 
 
 def test_plane_fits(benchmark: Any, points: np.ndarray) -> None:

@@ -1,4 +1,4 @@
-"""Train the trees of `edgel.evidence` on random scenes of `edgel.synth`, and write their weights into the package.
+"""Train the trees of `edgel._surface` on random scenes of `edgel.synth`, and write their weights into the package.
 
 Run: python benchmarks/train.py [--scenes 2000] (15 minutes on two cores; evidence is kept in benchmarks/cache/training).
 Needs `pip install edgel[train]`. Nothing of the benchmark and no real data is seen in training: see `training.example`.
@@ -21,9 +21,9 @@ import numpy as np
 import training
 
 from edgel import evidence, metrics
-from edgel.evidence import Evidence, coarse
-from edgel.evidence.forest import Forest, evaluate, read_forests
-from edgel.kdtree import build_index, leaf_starts
+from edgel._surface import Evidence, coarse
+from edgel._surface.forest import Forest, evaluate, read_forests
+from edgel._neighbors.kdtree import build_index, leaf_starts
 
 CACHE = Path(__file__).parent / "cache" / "training"
 OUT = Path(evidence.__file__).parent / evidence.WEIGHTS

@@ -127,7 +127,7 @@ def labels(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
                 continue
             near = metrics.nearest(at, places[here])
             own = near.distances[:, 0] <= (1.5 if wanted else 3) * scene.spacing
-            found = here[near.rows[own, 0]]
+            found = here[near.points[own, 0]]
             if mark is not None:
                 mark[found] = True
             else:

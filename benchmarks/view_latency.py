@@ -20,8 +20,8 @@ from typing import Any
 
 import edgel
 from edgel import synth
-from edgel.view.server import running
-from edgel.view.settings import Settings
+from edgel._viewer.server import running
+from edgel._viewer.settings import Settings
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from browser import chromium, input_of

@@ -19,7 +19,7 @@ from PIL import Image
 
 import edgel
 from edgel import synth
-from edgel.view.server import running
+from edgel._viewer.server import running
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from browser import choose, chromium, input_of, picture, type_number

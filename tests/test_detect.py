@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import edgel
 from edgel import EdgeKind
-from edgel.detect import DEFAULT_KINDS, EVEN, strength
+from edgel._detect import DEFAULT_KINDS, EVEN, strength
 
 
 def box(spacing=0.02, seed=0):

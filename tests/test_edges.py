@@ -52,30 +52,30 @@ def test_counts_and_shares():
     assert edges.num_without_normal == 1
     assert edges.count_kinds() == {"boundary": 1, "occluded": 1, "crease": 2}
     assert edges.median_crease_angle == pytest.approx((np.pi / 2 + np.arccos(0.8)) / 2)
-    assert np.isnan(edges.only("occluded").median_crease_angle)
+    assert np.isnan(edges.of_kinds("occluded").median_crease_angle)
     assert repr(edges) == "Edges(3 of 5 points, 75.0%, 1 not finite; preset default, method surface)"
 
 
 def test_those_inside_a_box():
     edges, cloud = edges_of_three(), cloud_of_five()
     low, high = [-np.inf, 5_000_000.25, -np.inf], [500_001, np.inf, np.inf]
-    np.testing.assert_array_equal(edges.inside(cloud, [low, high]).index, [1])  # on two faces of the box
-    assert len(edges.inside(cloud, [[-np.inf] * 3, [np.inf] * 3])) == 3
+    np.testing.assert_array_equal(edges.crop(cloud, [low, high]).index, [1])  # on two faces of the box
+    assert len(edges.crop(cloud, [[-np.inf] * 3, [np.inf] * 3])) == 3
     for none in ([high, low], [0, 1], [[np.nan] * 3, high]):
         with pytest.raises(ValueError, match="box: expected a lower and an upper corner"):
-            edges.inside(cloud, none)
+            edges.crop(cloud, none)
 
 
 def test_only_some_kinds():
     edges = edges_of_three()
-    assert edges.only(["boundary", "occluded", "crease"]) is edges
-    found = edges.only("crease")
+    assert edges.of_kinds(["boundary", "occluded", "crease"]) is edges
+    found = edges.of_kinds("crease")
     assert found.index.tolist() == [0, 1]
     assert found.kind.tolist() == [8, 8]
     assert found.kind.dtype == np.uint8
     assert found.convex.tolist() == [1, -1]
     assert found.normals.shape == (2, 2, 3)
-    assert len(edges.only("color")) == 0
+    assert len(edges.of_kinds("color")) == 0
 
 
 def test_parts_of_the_published_answer_keep_their_planes():
@@ -104,7 +104,7 @@ def test_one_face_leaves_the_rest_unknown():
 
 def test_the_cloud_of_the_edge_points():
     cloud, edges = cloud_of_five(), edges_of_three()
-    found = edges.cloud(cloud)
+    found = edges.to_cloud(cloud)
     assert list(found.attributes) == ["intensity", *LABELS, *MORE]
     assert found.crs == cloud.crs
     np.testing.assert_array_equal(found.xyz, cloud.xyz[edges.index])
@@ -137,7 +137,7 @@ def test_every_format_keeps_what_is_known_of_the_edges(tmp_path, suffix, whole):
     if suffix == ".e57":
         pytest.importorskip("pye57")
     cloud, edges = cloud_of_five(), edges_of_three()
-    written = edges.label(cloud) if whole else edges.cloud(cloud)
+    written = edges.label(cloud) if whole else edges.to_cloud(cloud)
     if whole and suffix in (".las", ".laz", ".e57"):  # these hold no points without a place
         written = written.take(np.flatnonzero(np.isfinite(written.xyz).all(axis=1)))
     edgel.write(tmp_path / f"a{suffix}", written)
@@ -153,7 +153,7 @@ def test_every_format_keeps_what_is_known_of_the_edges(tmp_path, suffix, whole):
 
 @pytest.mark.parametrize("suffix", [".ply", ".pcd", ".las", ".xyz", ".npz"])
 def test_no_edges_can_be_written_too(tmp_path, suffix):
-    none = edges_of_three().only("color")
+    none = edges_of_three().of_kinds("color")
     edgel.write(tmp_path / f"a{suffix}", none.cloud(cloud_of_five()))
     found = edgel.read(tmp_path / f"a{suffix}")
     assert len(found) == 0

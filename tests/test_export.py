@@ -55,7 +55,7 @@ def test_edges_keep_no_cloud(edges):
 def test_a_table_has_the_columns_of_the_file(cloud, edges):
     pytest.importorskip("pandas")
     table = edges.to_dataframe()
-    written = edges.cloud(cloud).attributes
+    written = edges.to_cloud(cloud).attributes
     assert list(table.columns) == ["index", *written]
     assert table["index"].tolist() == edges.index.tolist()
     for name, values in written.items():
@@ -74,7 +74,7 @@ def test_pyvista_gets_places_and_columns(cloud, edges):
     pytest.importorskip("pyvista")
     made = edges.to_pyvista()
     np.testing.assert_array_equal(made.points, edges.position)
-    assert set(made.point_data.keys()) == {"index", "rgb", *edges.cloud(cloud).attributes}
+    assert set(made.point_data.keys()) == {"index", "rgb", *edges.to_cloud(cloud).attributes}
     np.testing.assert_array_equal(made.point_data["rgb"], palette.kind_colors(edges.kind))
 
 

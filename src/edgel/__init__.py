@@ -1,12 +1,13 @@
 """Find the edges of 3D point clouds, and their normals, without tuning."""
 
 from edgel import paper
+from edgel._detect import detect
+from edgel._neighbors.normals import Normals, estimate_normals
 from edgel.cloud import Cloud
-from edgel.detect import detect
 from edgel.edges import EdgeKind, Edges
 from edgel.io import FormatError, read, write
-from edgel.normals import Normals, estimate_normals
-from edgel.scale import detect_at_scale
+
+__version__ = "0.1.0.dev0"
 
 __all__ = [
     "Cloud",
@@ -15,7 +16,6 @@ __all__ = [
     "FormatError",
     "Normals",
     "detect",
-    "detect_at_scale",
     "estimate_normals",
     "paper",
     "read",

@@ -63,10 +63,8 @@ class Edges:
         Number of points of the input, finite or not.
     num_dropped : int
         How many of them were left out because a coordinate was NaN or infinite.
-    preset : str
-        The preset that found them.
     method : str
-        The way it went: "surface", "organized", "orthographic", "pinhole", "spherical", or "paper".
+        The way they were found: "surface", "organized", "orthographic", "pinhole", "spherical", or "paper".
     reason : str
         Why it went that way, one line; empty where there was no choice.
     parameters : mapping
@@ -85,7 +83,6 @@ class Edges:
     convex: np.ndarray
     num_points: int
     num_dropped: int
-    preset: str
     method: str
     reason: str
     parameters: Mapping[str, Any]
@@ -96,8 +93,7 @@ class Edges:
 
     def __repr__(self) -> str:
         dropped = f", {self.num_dropped:,} not finite" if self.num_dropped else ""
-        how = f"preset {self.preset}" + (f", method {self.method}" if self.method != self.preset else "")
-        return f"Edges({len(self):,} of {self.num_points:,} points, {self.share:.1%}{dropped}; {how})"
+        return f"Edges({len(self):,} of {self.num_points:,} points, {self.share:.1%}{dropped}; method {self.method})"
 
     @property
     def share(self) -> float:
@@ -124,7 +120,7 @@ class Edges:
         """Return some of the edge points (int, ascending, or bool (E,)); times and parameters stay those of all."""
         return replace(self, **{name: getattr(self, name)[rows] for name in _PER_POINT})
 
-    def only(self, kinds: EdgeKind | str | Iterable[str]) -> Self:
+    def of_kinds(self, kinds: EdgeKind | str | Iterable[str]) -> Self:
         """Return the edge points that are of some kinds (see `as_kinds`), without their flags of other kinds.
 
         The strength stays, that of the most marked of a point's kinds.
@@ -144,7 +140,7 @@ class Edges:
         kind = np.where(blunt, self.kind & ~np.uint8(EdgeKind.CREASE), self.kind)
         return replace(self, kind=kind).take(kind > 0)
 
-    def inside(self, points: Any, box: Any) -> Self:
+    def crop(self, points: Any, box: Any) -> Self:
         """Return the edge points of the input that lie in a box: its lower and its upper corner (2, 3), maybe infinite.
 
         Raises
@@ -157,7 +153,7 @@ class Edges:
             raise ValueError(f"box: expected a lower and an upper corner of three numbers each, got {box!r}")
         return self.take(in_box(as_cloud(points).xyz[self.index], corners))
 
-    def cloud(self, points: Any) -> Cloud:
+    def to_cloud(self, points: Any) -> Cloud:
         """Return the edge points of the input as a cloud: all its attributes, and what is known of the edge.
 
         That is ``edge_kind`` (uint8), ``edge_strength``, ``edge_angle`` (radians), ``edge_convex`` (int8), the normals
@@ -171,7 +167,7 @@ class Edges:
         return cloud.with_attributes(**columns)
 
     def label(self, points: Any) -> Cloud:
-        """Return the whole input with ``edge_kind edge_strength edge_angle edge_convex nx ny nz``, as `cloud` has them.
+        """Return the whole input with ``edge_kind edge_strength edge_angle edge_convex nx ny nz``, as `to_cloud` has them.
 
         Where there is no edge the first two and ``edge_convex`` are 0, the others NaN.
         """
@@ -193,13 +189,13 @@ class Edges:
         return export.to_open3d(self)
 
     def to_pyvista(self) -> Any:
-        """Return a PyVista mesh of `position`, with ``index``, ``rgb`` of the kind, and the columns of `cloud`."""
+        """Return a PyVista mesh of `position`, with ``index``, ``rgb`` of the kind, and the columns of `to_cloud`."""
         from edgel import export
 
         return export.to_pyvista(self)
 
     def to_dataframe(self) -> Any:
-        """Return a pandas table, one row an edge point: its ``index`` and the columns of `cloud`."""
+        """Return a pandas table, one row an edge point: its ``index`` and the columns of `to_cloud`."""
         from edgel import export
 
         return export.to_dataframe(self)

@@ -18,8 +18,8 @@ from PIL import Image
 
 from edgel.cloud import Cloud, check_points
 from edgel.edges import EdgeKind, Edges, kind_names
-from edgel.palette import KIND_COLORS, as_hex, kind_colors
 from edgel.plot import picture
+from edgel.plot.palette import KIND_COLORS, as_hex, kind_colors
 
 _SIZE = (640, 480)  # of the picture in a notebook, in pixels
 _DRAWN = 20_000  # points of a cloud that Matplotlib draws behind its edges: more take long, and show no more
@@ -92,8 +92,8 @@ def to_dataframe(edges: Edges) -> Any:
 
 
 def _columns(edges: Edges) -> dict[str, np.ndarray]:
-    """The columns that `Edges.cloud` gives a file, after the row of the input."""
-    described = replace(edges, index=np.arange(len(edges))).cloud(Cloud(edges.position))
+    """The columns that `Edges.to_cloud` gives a file, after the row of the input."""
+    described = replace(edges, index=np.arange(len(edges))).to_cloud(Cloud(edges.position))
     return {"index": edges.index, **described.attributes}
 
 

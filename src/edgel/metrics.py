@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from edgel._neighbors.kdtree import build_index
+from edgel._neighbors.knn import Neighbors, knn
 from edgel.edges import EdgeKind
-from edgel.kdtree import build_index
-from edgel.neighbors import Neighbors, knn
 
 IGNORE = 2
 """Label of points that count neither way (soft bands of the published truth)."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from edgel.parallel import kernel
+from edgel._kernels.parallel import kernel
 
 
 @kernel

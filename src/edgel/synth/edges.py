@@ -8,8 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
+from edgel._kernels.parallel import kernel, run_slices
 from edgel.cloud import as_cloud
-from edgel.parallel import kernel, run_slices
 
 EDGE_KINDS = ("boundary", "occluding", "crease")
 _CHORD = 0.05  # mm; on a radius of 57 mm the polyline is then within 6e-6 mm of the curve

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel.kdtree import build_index, node_start
-from edgel.parallel import kernel, run_slices
+from edgel._kernels.parallel import kernel, run_slices
+from edgel._neighbors.kdtree import build_index, node_start
 from edgel.synth.solid import Solid
 
 _EDGE_SLACK = 1e-9  # in barycentric coordinates: no ray slips through between two triangles

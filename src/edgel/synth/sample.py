@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from edgel._kernels.parallel import kernel
 from edgel.cloud import Cloud
 from edgel.edges import EdgeKind
-from edgel.parallel import kernel
 from edgel.synth.solid import Solid
 from edgel.synth.truth import CREASE_REACH, CREASE_TURN, STEP, Scene, near_edges, sample_curves
 from edgel.synth.view import check_options, surface_normals

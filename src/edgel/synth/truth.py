@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from edgel._neighbors.kdtree import build_index
+from edgel._neighbors.knn import knn
 from edgel.cloud import Cloud
 from edgel.edges import EdgeKind
-from edgel.kdtree import build_index
-from edgel.neighbors import knn
 from edgel.synth.edges import EdgeCurve
 from edgel.synth.solid import is_convex
 
@@ -133,7 +133,7 @@ def near_edges(points: np.ndarray, edges: TrueEdges, reach: float) -> np.ndarray
     count = min(4, len(edges))
     found = knn(build_index(np.ascontiguousarray(edges.positions)), np.ascontiguousarray(points), count)
     for column in range(count):  # where curves meet, the nearest sample may belong to the other one
-        rows = found.rows[:, column]
+        rows = found.points[:, column]
         offset = points - edges.positions[rows]
         along = np.einsum("ij,ij->i", offset, edges.tangents[rows])
         along = np.clip(along, -reach / 4, reach / 4)  # as far as the samples' own stretch of the curve goes

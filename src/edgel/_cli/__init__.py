@@ -1,0 +1,59 @@
+"""The command line: ``edgel detect``, ``view``, ``render``, ``normals``, ``info``, ``convert`` and ``demo``."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from typing import Annotated
+
+import typer
+
+from edgel._cli import convert, demo, detect, info, normals, render, view
+from edgel._cli.options import help_text
+
+_HELP = """Find the edges of 3D point clouds, and their normals, without tuning.
+
+\b
+  edgel info scan.ply                   what the file holds
+  edgel detect scan.ply -o edges.ply    its edge points, with kind and normal
+  edgel render scan.ply -o edges.png    a picture of it with its edges
+  edgel view scan.ply                   look at them in the browser
+  edgel demo                            two pipe fittings, with a report
+
+Reads PLY, PCD, LAS/LAZ, E57, XYZ/TXT/CSV/ASC/PTS, NPY/NPZ and depth images (PNG, TIFF, NPY); writes all but the images.
+"""
+_EPILOG = (
+    "Exit codes: 0 done, 1 an error inside edgel, 2 wrong usage, 3 the input cannot be read, 4 its data cannot be "
+    "processed, 5 the output cannot be written, 130 interrupted."
+)
+
+app = typer.Typer(
+    name="edgel",
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"edgel {version('edgel')}")
+        raise typer.Exit
+
+
+@app.callback(help=help_text(_HELP), epilog=_EPILOG)
+def main(
+    _version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    """Find the edges of 3D point clouds."""
+
+
+app.command(help=help_text(detect.HELP), epilog=_EPILOG)(detect.detect)
+app.command(help=help_text(view.HELP), epilog=_EPILOG)(view.view)
+app.command(help=help_text(normals.HELP), epilog=_EPILOG)(normals.normals)
+app.command(help=help_text(info.HELP), epilog=_EPILOG)(info.info)
+app.command(help=help_text(convert.HELP), epilog=_EPILOG)(convert.convert)
+app.command(help=help_text(render.HELP), epilog=_EPILOG)(render.render)
+app.command(help=help_text(demo.HELP), epilog=_EPILOG)(demo.demo)

@@ -1,0 +1,68 @@
+"""``edgel normals``: a normal for every point."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+import typer
+
+import edgel
+from edgel._cli import files, options
+from edgel._cli.errors import ExitCode, exit_codes, failing_as
+from edgel._cli.output import count, print_line, print_table, seconds
+from edgel._cli.progress import Watch
+from edgel._stages import Stages
+
+HELP = """Estimate the normal of every point of a cloud.
+
+The whole cloud is written with [bold]nx ny nz[/bold], unit normals, NaN where the neighbours span no plane, and
+[bold]variation[/bold], the surface variation (0 on a plane, 1/3 at most: large at edges and in noise).
+
+\b
+Examples:
+  edgel normals scan.ply -o normals.ply
+  edgel normals scan.las -o normals.laz --num-neighbors 24 --viewpoint 637000 849000 2000
+  cat scan.ply | edgel normals - -o - > normals.ply
+"""
+
+
+def normals(
+    source: options.Input,
+    output: Annotated[
+        str, typer.Option("-o", "--output", metavar="OUT", help="The cloud to write; - writes PLY to stdout.")
+    ],
+    num_neighbors: Annotated[
+        int | None,
+        options.option(edgel.estimate_normals, "num_neighbors", "Neighbours of each plane fit, the point among them."),
+    ] = None,
+    viewpoint: options.Viewpoint = None,
+    intrinsics: options.Intrinsics = None,
+    debug: options.Debug = False,
+) -> None:
+    """Estimate the normal of every point of a cloud."""
+    given = {"num_neighbors": num_neighbors, "viewpoint": viewpoint}
+    given = {name: value for name, value in given.items() if value is not None}
+    with exit_codes(debug=debug):
+        files.check_output(output)
+        files.check_input(source, intrinsics)
+        with Watch() as watch:
+            stages = Stages(watch)
+            with stages("reading"):
+                cloud = files.read_cloud(source, intrinsics)
+            with stages("normals"), failing_as(ExitCode.DATA, source, given):
+                planes = edgel.estimate_normals(cloud, **given)
+            with stages("writing"):
+                nx, ny, nz = planes.normals.astype(np.float32).T
+                variation = planes.variation.astype(np.float32)
+                files.write_cloud(output, cloud.with_attributes(nx=nx, ny=ny, nz=nz, variation=variation))
+        rows: list[tuple[str, ...]] = [("points", count(len(cloud)))]
+        not_finite = int(np.isnan(cloud.xyz.sum(axis=1) * 0).sum())
+        if not_finite:
+            rows.append(("not finite", count(not_finite), "without a normal"))
+        if planes.num_undefined > not_finite:
+            rows.append(("normals undefined", count(planes.num_undefined - not_finite), "the neighbours span no plane"))
+        rows.append(("time", seconds(sum(stages.seconds.values()))))
+        rows += [(f"  {name}", seconds(duration)) for name, duration in stages.seconds.items()]
+        print_table(f"Normals of {source}", rows)
+        print_line(f"{'stdout' if output == files.PIPE else output}: the whole cloud with nx, ny, nz and variation")

@@ -1,0 +1,110 @@
+"""Options of the commands, with the defaults of the functions they stand for."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import Annotated, Any
+
+import typer
+
+import edgel
+from edgel._cli.errors import as_option
+from edgel._detect import PRESETS
+from edgel._range_image.view import METHODS
+from edgel.edges import ASKABLE, EdgeKind, kind_names
+
+PAPER = "The published method (--preset paper)"
+
+Input = Annotated[str, typer.Argument(metavar="IN", help="The cloud to read; - reads PLY from stdin.")]
+Intrinsics = Annotated[
+    str | None,
+    typer.Option(metavar="FILE", help="Camera of a depth image: JSON with fx, fy, cx, cy.", show_default=False),
+]
+Viewpoint = Annotated[
+    tuple[float, float, float] | None,
+    typer.Option(
+        metavar="X Y Z",
+        help="Where the sensor stood, in the cloud's unit: normals are turned towards it."
+        + " [dim]\\[default: what the file says, else from above][/dim]",
+        show_default=False,
+    ),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object on stdout.")]
+Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
+
+
+def default_of(function: Callable[..., Any], name: str) -> Any:
+    """Return the default of a function's parameter, so that it is written once, in the function.
+
+    Examples
+    --------
+    >>> import edgel
+    >>> default_of(edgel.paper.detect, "kernel_size")
+    5
+    """
+    return inspect.signature(function).parameters[name].default
+
+
+def option(
+    function: Callable[..., Any], name: str, text: str, *, panel: str | None = None, metavar: str | None = None
+) -> Any:
+    """Make the option that stands for a function's parameter, its default shown but left to the function."""
+    default = default_of(function, name)
+    return typer.Option(
+        as_option(name),
+        metavar=metavar,
+        help=text + default_note(_shown(default)),
+        show_default=False,
+        rich_help_panel=panel,
+    )
+
+
+def _shown(default: Any) -> str:
+    if default is None:
+        return "chosen from the data"
+    if isinstance(default, EdgeKind):
+        return ",".join(kind_names(default))
+    return default if isinstance(default, str) else f"{default:g}"
+
+
+def default_note(shown: str) -> str:
+    """Return the end of an option's help, for a default that the function has and the option has not."""
+    return f" [dim]\\[default: {shown}][/dim]"
+
+
+def help_text(text: str) -> str:
+    """Join the lines of each paragraph, which Typer would break where they end.
+
+    Paragraphs that begin with a backspace stay as they are, which is Typer's own sign.
+    """
+    paragraphs = text.strip("\n").split("\n\n")
+    return "\n\n".join(p if p.startswith("\b") else " ".join(p.split()) for p in paragraphs)
+
+
+def paper_option(name: str, text: str) -> Any:
+    """Make an option of the published method."""
+    return option(edgel.paper.detect, name, text, panel=PAPER)
+
+
+Preset = Annotated[str, typer.Option(metavar="|".join(PRESETS), help="The method: edgel's own, or the published one.")]
+PRESET = default_of(edgel.detect, "preset")
+Kinds = Annotated[
+    str | None,
+    option(
+        edgel.detect,
+        "kinds",
+        f"Kinds of edge to look for, commas between: {', '.join(kind_names(ASKABLE))}.",
+        metavar="NAMES",
+    ),
+]
+Method = Annotated[
+    str | None,
+    option(
+        edgel.detect,
+        "method",
+        f"How to look at the cloud: {', '.join(METHODS[:-1])} or {METHODS[-1]}. Surface takes any cloud, from any "
+        "side; organized goes along its rows and columns; the last three look at a projection; auto chooses.",
+        metavar="NAME",
+    ),
+]

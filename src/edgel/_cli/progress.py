@@ -1,0 +1,82 @@
+"""Tell the user what takes time: the stage, and the kernels that are compiled on the first run."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+
+from numba.core import event
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+from edgel._cli.output import print_line, seconds, stderr_console
+
+COMPILING = "compiling kernels, first run only"
+
+
+class Watch(event.Listener):
+    """Show the stage that runs, on stderr, and only on a terminal; say anywhere that kernels are being compiled.
+
+    Call it with the name of each stage as it begins: it is the ``progress`` of the library's functions.
+
+    Examples
+    --------
+    >>> with Watch() as watch:
+    ...     watch("reading")
+    """
+
+    def __init__(self) -> None:
+        console = stderr_console()
+        columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+        self._bar = Progress(*columns, console=console, transient=True) if console.is_terminal else None
+        self._task = None if self._bar is None else self._bar.add_task("starting", total=None)
+        self._stage = "starting"
+        self._depth = 0  # a kernel that calls another compiles it meanwhile
+        self._told = False
+        self._began = 0.0
+        self.compile_seconds = 0.0
+
+    def __call__(self, stage: str) -> None:
+        """Show the name of a stage."""
+        self._stage = stage
+        self._describe(stage)
+
+    def __enter__(self) -> Watch:
+        """Begin to watch."""
+        # Numba tells of a kernel only when it compiles one: loading it from the disk cache is no event.
+        event.register("numba:compile", self)
+        if self._bar is not None:
+            self._bar.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Clear the line."""
+        event.unregister("numba:compile", self)
+        if self._bar is not None:
+            self._bar.stop()
+        if self._told and self.compile_seconds > 1:
+            print_line(f"compiled kernels in {seconds(self.compile_seconds)}; later runs start at once", style="dim")
+
+    def on_start(self, event: event.Event) -> None:
+        """Tell of a kernel whose compilation begins; called by Numba."""
+        self._depth += 1
+        if self._depth > 1:
+            return
+        self._began = time.perf_counter()
+        if self._bar is None and not self._told:
+            print_line(f"{COMPILING} ...")
+        self._told = True
+        kernel = event.data["dispatcher"].py_func.__name__.strip("_").replace("_", " ")  # pyright: ignore[reportOptionalSubscript]
+        self._describe(f"{self._stage}: {COMPILING}: {kernel}")
+
+    def on_end(self, event: event.Event) -> None:
+        """Take up the stage again; called by Numba."""
+        self._depth -= 1
+        if self._depth == 0:
+            self.compile_seconds += time.perf_counter() - self._began
+            self._describe(self._stage)
+
+    def _describe(self, text: str) -> None:
+        if self._bar is not None and self._task is not None:
+            self._bar.update(self._task, description=text)

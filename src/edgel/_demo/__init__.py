@@ -1,0 +1,131 @@
+"""The published experiment again: two pipe fittings, the paper's tables beside ours, and a report to look at."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from edgel import paper, plot, synth
+from edgel._demo.measure import NUM_NEIGHBORS, Measurement, Times, measure_times
+from edgel._demo.tables import REACH, count_table, findings, normals_table, offset_table, time_table, truth_table
+from edgel._demo.truth import found_lengths, offsets
+from edgel._detect import detect
+from edgel._report import Case, Table, make_directory, write_report
+from edgel.io import write
+
+__all__ = ["Demo", "Measurement", "Times", "run_demo", "side_by_side"]
+
+
+@dataclass(frozen=True, eq=False)
+class Demo:
+    """What `run_demo` measured and wrote.
+
+    Attributes
+    ----------
+    measurements : tuple of Measurement
+        Tee and elbow.
+    tables : tuple of Table
+        The paper's tables beside ours, and what it leaves out.
+    findings : tuple of str
+        What they say, in sentences.
+    page : Path
+        The report.
+    files : tuple of Path
+        Everything written, the page too.
+    """
+
+    measurements: tuple[Measurement, ...]
+    tables: tuple[Table, ...]
+    findings: tuple[str, ...]
+    page: Path
+    files: tuple[Path, ...]
+
+
+def run_demo(
+    directory: str | os.PathLike[str],
+    *,
+    repeats: int = 3,
+    num_points: int | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Demo:
+    """Simulate the paper's tee and elbow, find their edges as it does, and compare times and truth with what it says.
+
+    Parameters
+    ----------
+    directory : path
+        Made if it does not exist. Clouds and edge points go there as PLY, figures as PNG, and the report.
+    repeats : int
+        Rounds of time measurement after one that only warms up; the median counts.
+    num_points : int, optional
+        Points of each scan. Default: as many as in the paper.
+    progress : callable, optional
+        Called with the name of each step as it begins.
+
+    Raises
+    ------
+    ValueError
+        If `repeats` is below 1 or `num_points` below 100.
+    OSError
+        If the directory cannot be made or written.
+    """
+    if repeats < 1:
+        raise ValueError(f"repeats: expected 1 or more, got {repeats}")
+    if num_points is not None and num_points < 100:
+        raise ValueError(f"num_points: expected 100 or more, got {num_points}")
+    folder = make_directory(directory)
+    tell = progress or (lambda _: None)
+    tell("scanning")
+    scans = [synth.scan(part, num_points=num_points) for part in (synth.tee(), synth.elbow())]
+    tell("finding edges")
+    paper.detect(scans[0].cloud, num_neighbors=NUM_NEIGHBORS)  # so that the report's times hold no compilation
+    found = [paper.detect(scan.cloud, num_neighbors=NUM_NEIGHBORS) for scan in scans]
+    times = measure_times(scans, found, repeats, tell)
+    tell("comparing with the default preset")
+    others = [detect(scan.cloud) for scan in scans]
+    tell("comparing with the truth")
+    measurements = tuple(
+        Measurement(scan, edges, spent, found_lengths(scan, edges, reach=REACH), offsets(scan, edges))
+        for scan, edges, spent in zip(scans, found, times, strict=True)
+    )
+    tables = tuple(make(measurements) for make in (count_table, normals_table, time_table, truth_table, offset_table))
+    said = tuple(sentence for one in measurements for sentence in findings(one))
+    tell("writing clouds")
+    files = [path for one in measurements for path in _write_clouds(folder, one)]
+    tell("drawing")
+    plot.save(folder / "edges.png", side_by_side(measurements))
+    cases = [
+        Case(one.name, one.scan.cloud, one.edges, one.scan.part, other=other)
+        for one, other in zip(measurements, others, strict=True)
+    ]
+    page = write_report(cases, folder, title="Edges of a tee and an elbow", findings=said, tables=tables)
+    figures = [folder / f"{one.name}-figure-{number}.png" for one in measurements for number in (1, 3, 4, 5, 8, 9)]
+    return Demo(measurements, tables, said, page, (page, folder / "edges.png", *figures, *files))
+
+
+def side_by_side(measurements: Sequence[Measurement], *, width: int = 1600) -> np.ndarray:
+    """Draw figure 4 of all parts in one picture at one scale, (H, width, 3) uint8."""
+    gap, rim = width // 40, 4
+    extents = [np.ptp(one.scan.part.bounds, axis=0) for one in measurements]
+    free = width - gap * (len(extents) - 1) - 2 * rim * len(extents)
+    scale = free / sum(extent[0] for extent in extents)
+    height = int(np.ceil(max(extent[1] for extent in extents) * scale)) + 2 * rim
+    canvas = np.full((height, width, 3), 255, np.uint8)
+    left = 0
+    for one, extent in zip(measurements, extents, strict=True):
+        size = int(extent[0] * scale) + 2 * rim, height
+        rows = one.edges.index
+        picture = plot.render(one.scan.cloud, rows_on_top=rows, direction="top", size=size, margin=rim / min(size))
+        canvas[:, left : left + size[0]] = picture
+        left += size[0] + gap
+    return canvas
+
+
+def _write_clouds(folder: Path, one: Measurement) -> list[Path]:
+    whole, edges = folder / f"{one.name}.ply", folder / f"{one.name}-edges.ply"
+    write(whole, one.scan.cloud)
+    write(edges, one.edges.to_cloud(one.scan.cloud))
+    return [whole, edges]

@@ -1,0 +1,160 @@
+"""The whole method on one screen: what `edgel.detect` does with a cloud."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any, Literal
+
+import numpy as np
+
+from edgel._color import color_channels, color_edges
+from edgel._labels import LIKELY, Labels, strength_of_contrast, strength_of_probability
+from edgel._neighbors.candidates import at_points
+from edgel._neighbors.kdtree import build_index
+from edgel._neighbors.normals import check_num_neighbors, fit_planes, towards
+from edgel._range_image import METHODS, choose_view, outlines
+from edgel._scale import at_scale, check_scale
+from edgel._stages import Stages
+from edgel._surface import classify, cloud_statistics, localize, screen
+from edgel.cloud import as_cloud, as_vector, check_points
+from edgel.edges import EdgeKind, Edges, as_kinds
+
+DEFAULT_KINDS = EdgeKind.BOUNDARY | EdgeKind.OCCLUDING | EdgeKind.OCCLUDED | EdgeKind.CREASE
+
+
+def detect(
+    points: Any,
+    *,
+    kinds: EdgeKind | str | Iterable[str] = DEFAULT_KINDS,
+    method: Literal["auto", "surface", "organized", "orthographic", "pinhole", "spherical"] = "auto",
+    min_strength: float = LIKELY,
+    scale: float = 1.0,
+    num_neighbors: int = 16,
+    viewpoint: Any = None,
+    progress: Callable[[str], None] | None = None,
+) -> Edges:
+    """Find the edge points of a cloud, their kind, and the surface on either side.
+
+    Parameters
+    ----------
+    points : (N, 3) or (H, W, 3) array_like, Cloud, or an object that carries points
+        Points with a NaN or infinite coordinate are left out and counted.
+    kinds : EdgeKind, or str, or iterable of str
+        The kinds of edge wanted, as flags or as names ("boundary", "occluding", "occluded", "crease", "color"); all but
+        color unless told. A point of several kinds keeps the flags of those wanted.
+    method : {"auto", "surface", "organized", "orthographic", "pinhole", "spherical"}
+        The way to look at the cloud: on the surface itself, from any side; along the rows and columns of an organized
+        cloud; or in a projection of that kind. "auto" chooses, and `Edges.method` and `Edges.reason` say what and why.
+        The published method is `edgel.paper.detect`.
+    min_strength : float
+        Least `Edges.strength` of the points returned, in (0, 1]; one half, on any cloud, is where an edge is as likely
+        as not. Lower finds fainter edges and more that are none.
+    scale : float
+        Size of the smallest edges wanted, in median spacings, 1 or more: above 1 the cloud is thinned to one point a
+        voxel of that size first, and what is smaller cannot be seen.
+    num_neighbors : int
+        k of the plane fits that give the normals, the point itself among them; at least 3.
+    viewpoint : (3,) array_like, optional
+        Normals are turned towards it. Default: the sensor's position when the cloud knows it, else from above (+Z).
+    progress : callable, optional
+        Called with the name of each stage as it begins.
+
+    Returns
+    -------
+    Edges
+        The same whatever the order of the points and the number of threads.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If `points` carries no coordinates or fewer than 3 finite ones, or lies on one line or spot, where no surface
+        is; if an option is out of its range.
+
+    Examples
+    --------
+    >>> import numpy as np, edgel
+    >>> x, y = np.meshgrid(np.arange(40.0), np.arange(40.0))
+    >>> roof = np.c_[x.ravel(), y.ravel(), -abs(x.ravel() - 20)]
+    >>> edges = edgel.detect(roof)
+    >>> ridge = edges.index[edges.kind == edgel.EdgeKind.CREASE]
+    >>> set(roof[ridge, 0].tolist())
+    {20.0}
+    """
+    kinds = as_kinds(kinds)
+    _check_options(method, min_strength, scale)
+    options = {"kinds": kinds, "method": method, "min_strength": min_strength, "num_neighbors": num_neighbors}
+    if scale > 1:
+        return at_scale(detect, points, scale, progress=progress, viewpoint=viewpoint, **options)
+    cloud, stages = as_cloud(points), Stages(progress)
+    viewpoint = cloud.viewpoint if viewpoint is None else as_vector(viewpoint, "viewpoint")
+    finite = check_points(cloud)
+    xyz, k = finite.xyz, check_num_neighbors(num_neighbors, len(finite.xyz))
+    colors = _channels(cloud, kinds)
+
+    with stages("index"):
+        index = build_index(xyz)
+    with stages("screening"):
+        statistics = cloud_statistics(index)
+        if not statistics.has_surface:
+            raise ValueError("points: all lie on one line or spot, so there is no surface whose edges could be found")
+        screening = screen(index, statistics)
+    with stages("view"):
+        view = choose_view(cloud, finite, index, method, viewpoint)
+    with stages("classification"):
+        classified = classify(index, screening)
+    labels = Labels(len(xyz))
+    with stages("labels"):
+        labels.add(classified.points, EdgeKind.CREASE, strength_of_probability(classified.crease))
+        if view.image is None:
+            labels.add(classified.points, EdgeKind.BOUNDARY, strength_of_probability(classified.outline))
+        else:
+            outline = outlines(view.image, xyz)
+            labels.add(np.arange(len(xyz)), outline.kind, outline.strength)
+    if colors is not None:
+        with stages("color"):
+            contrast = color_edges(index, xyz, screening.normals_of_points(index), colors[finite.rows]).strength
+            labels.add(np.arange(len(xyz)), EdgeKind.COLOR, strength_of_contrast(contrast))
+    with stages("localisation"):
+        kind = labels.of(kinds, min_strength)
+        edge = np.flatnonzero(kind)
+        planes = towards(fit_planes(index, at_points(index, edge), k), xyz[edge], viewpoint)
+        creases = classified.take(np.flatnonzero(kind[classified.points] & EdgeKind.CREASE))
+        faces = localize(creases.evidence, xyz[creases.points], viewpoint)
+        faces = faces.spread(edge, creases.points, xyz[edge], planes.normals)
+    return Edges(
+        index=finite.rows[edge],
+        kind=kind[edge],
+        strength=labels.strength[edge],
+        position=faces.position,
+        direction=faces.direction,
+        normals=faces.normals,
+        angle=faces.angle,
+        convex=faces.convex,
+        num_points=finite.num_input,
+        num_dropped=finite.num_dropped,
+        method=view.method,
+        reason=view.reason,
+        parameters={"min_strength": min_strength, "num_neighbors": k},
+        seconds=stages.seconds,
+    )
+
+
+def _check_options(method: str, min_strength: float, scale: float) -> None:
+    if method not in METHODS:
+        raise ValueError(
+            f"method: expected one of {', '.join(METHODS)}, got {method!r}"
+            + ("; the published method is edgel.paper.detect" if method == "paper" else "")
+        )
+    if not 0 < min_strength <= 1:
+        raise ValueError(f"min_strength: expected a number above 0 and at most 1, got {min_strength}")
+    check_scale(scale)
+
+
+def _channels(cloud: Any, kinds: EdgeKind) -> np.ndarray | None:
+    """Return the colors of a cloud (N, C) if color edges are wanted."""
+    if EdgeKind.COLOR not in kinds:
+        return None
+    channels = color_channels(cloud)
+    if channels is None:
+        raise ValueError("kinds: color edges need red, green and blue or an intensity, and the cloud carries neither")
+    return channels

@@ -1,0 +1,96 @@
+"""Hysteresis at every threshold at once: up to which a pixel stays, and its chain is long enough."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from edgel._kernels.parallel import kernel
+
+FAINTEST = 0.05  # of the level 1: what lies below is not looked at
+
+
+def levels(values: np.ndarray, weak: float, least: int) -> np.ndarray:
+    """Find the highest threshold at which hysteresis keeps each pixel.
+
+    Hysteresis at a threshold t keeps a pixel above ``weak * t`` that 8-neighbours above it join to one of t or more,
+    and here to `least` pixels in all. A lower threshold keeps whatever a higher one does, so one number says it all;
+    found by joining pixels from the largest down, as in a maximum spanning tree.
+
+    Parameters
+    ----------
+    values : (H, W) float64
+    weak : float
+        In (0, 1].
+    least : int
+
+    Returns
+    -------
+    (H, W) float64
+        0 where no threshold above `FAINTEST` keeps the pixel.
+    """
+    padded = np.pad(values, 1).ravel()
+    shown = np.flatnonzero(padded >= weak * FAINTEST)
+    order = shown[np.argsort(-padded[shown], kind="stable")]
+    found = np.zeros(len(padded))
+    _join(order, padded, values.shape[1] + 2, weak, least, found)
+    return found.reshape(values.shape[0] + 2, -1)[1:-1, 1:-1]
+
+
+@kernel
+def _root(parent, pixel):
+    while parent[pixel] != pixel:
+        parent[pixel] = parent[parent[pixel]]
+        pixel = parent[pixel]
+    return pixel
+
+
+@kernel
+def _settle(root, until, weak, least, values, size, since, following, head, found):
+    """Give the members of a chain that have no level yet the one that it reaches before it changes at `until`."""
+    if size[root] < least:
+        return
+    level = min(values[root], since[root] / weak)
+    if level < until / weak:
+        return
+    member = head[root]
+    while member >= 0:
+        found[member] = level
+        member = following[member]
+    head[root] = -1
+
+
+@kernel
+def _join(order, values, width, weak, least, found):
+    """Join pixels, the largest first; a chain's root is its largest pixel, `since` when it last grew."""
+    count = len(values)
+    parent = np.full(count, -1, np.int64)
+    following, head, tail = np.full(count, -1, np.int64), np.full(count, -1, np.int64), np.full(count, -1, np.int64)
+    size, since = np.zeros(count, np.int64), np.zeros(count)
+    for pixel in order:
+        value = values[pixel]
+        parent[pixel] = head[pixel] = tail[pixel] = pixel
+        size[pixel], since[pixel] = 1, value
+        for r in range(-1, 2):
+            for c in range(-1, 2):
+                beside = pixel + r * width + c
+                if parent[beside] < 0:
+                    continue
+                a, b = _root(parent, beside), _root(parent, pixel)
+                if a == b:
+                    continue
+                _settle(a, value, weak, least, values, size, since, following, head, found)
+                _settle(b, value, weak, least, values, size, since, following, head, found)
+                if values[b] > values[a]:
+                    a, b = b, a
+                parent[b] = a
+                size[a] += size[b]
+                since[a] = value
+                if head[b] >= 0:
+                    if head[a] >= 0:
+                        following[tail[a]] = head[b]
+                    else:
+                        head[a] = head[b]
+                    tail[a] = tail[b]
+    for pixel in order:
+        if parent[pixel] == pixel:
+            _settle(pixel, 0.0, weak, least, values, size, since, following, head, found)

@@ -1,0 +1,175 @@
+"""Surface normals by plane fits to the nearest neighbours, at all points or only where they are asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from edgel._kernels.parallel import run_slices
+from edgel._neighbors.candidates import Queries, anywhere, every_point, tree_of
+from edgel._neighbors.kdtree import NeighborIndex, build_index
+from edgel._neighbors.plane_fits import fit_slice
+from edgel.cloud import as_cloud, as_vector, check_points, check_rows
+
+_SLICE = 8192  # queries: the first chunk of a slice has none before it to guess its reach from
+
+
+@dataclass(frozen=True, eq=False)
+class Normals:
+    """Best-fit planes ``normal . p = offset`` of the points asked for, in their order.
+
+    Attributes
+    ----------
+    normals : (M, 3) float64
+        Unit normals; NaN where the neighbours span no plane or the point itself is not finite.
+    offset : (M,) float64
+        D of the paper's eq. 20, the plane's signed distance from the origin, in the cloud's unit.
+    residual : (M,) float64
+        e of eq. 20, the sum of squared distances of the neighbours to the plane, in the cloud's unit squared.
+    variation : (M,) float64
+        Surface variation, smallest over summed variance (Pauly et al. 2002): 0 on a plane, 1/3 at most.
+    """
+
+    normals: np.ndarray
+    offset: np.ndarray
+    residual: np.ndarray
+    variation: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.normals)
+
+    @property
+    def num_undefined(self) -> int:
+        """Number of points without a normal."""
+        return int(np.isnan(self.offset).sum())
+
+    def take(self, rows: np.ndarray) -> Normals:
+        """Return the planes of some rows."""
+        return Normals(self.normals[rows], self.offset[rows], self.residual[rows], self.variation[rows])
+
+    def put(self, rows: np.ndarray, planes: Normals) -> None:
+        """Overwrite the planes of some rows."""
+        for each in fields(self):
+            getattr(self, each.name)[rows] = getattr(planes, each.name)
+
+    def flipped(self, where: np.ndarray) -> Normals:
+        """Return the same planes with the normals of a (M,) mask turned round."""
+        sign = np.where(where, -1.0, 1.0)
+        return replace(self, normals=self.normals * sign[:, None], offset=self.offset * sign)
+
+
+def no_planes(count: int) -> Normals:
+    """Return that many planes, all still undefined."""
+    return Normals(np.full((count, 3), np.nan), *(np.full(count, np.nan) for _ in range(3)))
+
+
+def estimate_normals(points: Any, *, at: Any = None, num_neighbors: int = 16, viewpoint: Any = None) -> Normals:
+    """Fit a plane to the k nearest neighbours of each point, or only of the points `at`.
+
+    Parameters
+    ----------
+    points : (N, 3) or (H, W, 3) array_like, Cloud, or an object that carries points
+        Neighbours are searched among all of its finite points, exactly.
+    at : (M,) int or (N,) bool, optional
+        Rows of the points whose normals are wanted; default all.
+    num_neighbors : int
+        k, the point itself among them; at least 3. Fewer are used when the cloud has fewer.
+    viewpoint : (3,) array_like, optional
+        Normals are turned towards it. Default: the sensor's position when the cloud knows it, else from above (+Z).
+
+    Returns
+    -------
+    Normals
+        One row a point asked for; the same whatever the order of the points and the number of threads.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If `points` carries no coordinates or fewer than 3 finite ones, or an option is out of its range.
+
+    Notes
+    -----
+    Total least squares as in eq. 20 of the paper: the eigenvector of the smallest eigenvalue of the neighbours' scatter
+    matrix.
+
+    Examples
+    --------
+    >>> import numpy as np, edgel
+    >>> x, y = np.meshgrid(np.arange(10.0), np.arange(10.0))
+    >>> edgel.estimate_normals(np.c_[x.ravel(), y.ravel(), 0 * x.ravel()], at=[44]).normals
+    array([[0., 0., 1.]])
+    """
+    cloud = as_cloud(points)
+    if viewpoint is None:
+        viewpoint = cloud.viewpoint
+    viewpoint = None if viewpoint is None else as_vector(viewpoint, "viewpoint")
+    checked = check_points(cloud)
+    index = build_index(checked.xyz)
+    k = check_num_neighbors(num_neighbors, len(index))
+    if at is None and checked.num_dropped == 0:
+        return towards(fit_planes(index, every_point(index), k), checked.xyz, viewpoint)
+    rows = np.arange(len(cloud)) if at is None else check_rows(at, len(cloud))
+    finite = np.asarray(np.isfinite(cloud.xyz[rows]).all(axis=1))
+    xyz = cloud.xyz[rows[finite]]
+    planes = fit_planes(index, anywhere(xyz), k) if len(xyz) else no_planes(0)
+    return _put_back(towards(planes, xyz, viewpoint), finite)
+
+
+def check_num_neighbors(num_neighbors: int, num_points: int) -> int:
+    """Check k of a plane fit and return how many neighbours a cloud of `num_points` can give."""
+    if not isinstance(num_neighbors, int | np.integer) or num_neighbors < 3:
+        raise ValueError(f"num_neighbors: a plane needs at least 3, got {num_neighbors!r}")
+    return min(int(num_neighbors), num_points)
+
+
+def fit_planes(index: NeighborIndex, queries: Queries, num_neighbors: int) -> Normals:
+    """Fit planes to the k nearest neighbours of queries; the normals look upwards (+Z).
+
+    All points are neighbours where there are fewer than `num_neighbors`.
+    """
+    return _fit(index, queries, min(num_neighbors, len(index)), np.empty(0))
+
+
+def fit_planes_within(index: NeighborIndex, queries: Queries, num_neighbors: int) -> tuple[Normals, np.ndarray]:
+    """Fit planes as `fit_planes` does, and say within which distance the neighbours lie.
+
+    Returns
+    -------
+    Normals
+    (M,) float64
+        Distance within which the neighbours of each lie.
+    """
+    limits = np.empty(len(queries))
+    planes = _fit(index, queries, num_neighbors, limits)
+    return planes, np.sqrt(limits)
+
+
+def _fit(index: NeighborIndex, queries: Queries, num_neighbors: int, limits: np.ndarray) -> Normals:
+    count = len(queries)
+    planes = Normals(np.empty((count, 3)), np.empty(count), np.empty(count), np.empty(count))
+    results = (planes.normals, planes.offset, planes.residual, planes.variation)
+    run_slices(fit_slice, count, queries.arrays, tree_of(index), num_neighbors, *results, limits, size=_SLICE)
+    return planes
+
+
+def towards(planes: Normals, xyz: np.ndarray, viewpoint: np.ndarray | None) -> Normals:
+    """Turn the upward normals of `fit_planes` at (M, 3) positions towards a viewpoint (3,), unless it is None."""
+    if viewpoint is None:
+        return planes
+    return planes.flipped(((viewpoint - xyz) * planes.normals).sum(axis=1) < 0)
+
+
+def by_offset(planes: Normals) -> Normals:
+    """Turn the normals so that ``D > 0``, the orientation of the paper (eq. 20)."""
+    return planes.flipped(planes.offset < 0)
+
+
+def _put_back(planes: Normals, finite: np.ndarray) -> Normals:
+    """Put planes into the rows of a mask, NaN elsewhere."""
+    if finite.all():
+        return planes
+    full = no_planes(len(finite))
+    full.put(np.flatnonzero(finite), planes)
+    return full

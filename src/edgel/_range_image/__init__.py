@@ -1,0 +1,18 @@
+"""Edges in the image that a sensor saw: views, range images, facets, steps in depth and rims."""
+
+from edgel._range_image.outline import Outline, outlines
+from edgel._range_image.range_image import RangeImage, organized, orthographic, pinhole, spherical
+from edgel._range_image.view import METHODS, View, choose_view
+
+__all__ = [
+    "METHODS",
+    "Outline",
+    "RangeImage",
+    "View",
+    "choose_view",
+    "organized",
+    "orthographic",
+    "outlines",
+    "pinhole",
+    "spherical",
+]

@@ -1,0 +1,297 @@
+"""RangeImage: a cloud as a sensor sees it, one point a pixel.
+
+Organized clouds come as they are; any other points are projected along a direction, onto the image plane of a camera,
+or onto a sphere. Depth stays in the cloud's unit, as float64: no grey levels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from edgel._kernels.parallel import kernel
+from edgel._neighbors.candidates import at_places
+from edgel._neighbors.kdtree import build_index
+from edgel._neighbors.knn import knn
+from edgel._neighbors.spacing import covered_area
+
+FRAME = 4  # empty pixels around a projection, so that the cloud's rim lies beside a void
+_SAMPLE = 2000  # points at which the evenness of the image is looked at
+_RINGS = 0.25  # nearest neighbours this much flatter than 45 degrees lie on scan lines along the rows
+_GRID, _EVEN = 0.9, 0.75  # nearest neighbours of a grid are 1 spacing away, those of random points 0.5
+_LOOSE = 1.3  # pixels of random points are this much larger than their spacing, or a third would be empty
+_MOST_PIXELS = 50  # for each point
+
+
+@dataclass(frozen=True, eq=False)
+class RangeImage:
+    """Which point each pixel shows, and how far from the viewer it is.
+
+    Attributes
+    ----------
+    depth : (H, W) float64
+        Distance from the viewpoint, or along the direction of parallel rays, in the cloud's unit; NaN = nothing.
+    index : (H, W) int64
+        Row of the point, among those the image was made of; -1 = nothing.
+    method : str
+        "organized", "orthographic", "pinhole" or "spherical".
+    pitch : (float, float)
+        Size of a pixel, along a column and along a row of the image: radians where the rays leave a viewpoint, else in
+        the cloud's unit.
+    viewpoint : (3,) float64 or None
+        Where the rays leave; None where they are parallel.
+    direction : (3,) float64
+        Unit vector along the parallel rays, or along the middle one.
+    behind : (N,) float64
+        How far each point lies behind the one that its pixel shows, in spacings; 0 for the points shown.
+    """
+
+    depth: np.ndarray
+    index: np.ndarray
+    method: str
+    pitch: tuple[float, float]
+    viewpoint: np.ndarray | None
+    direction: np.ndarray
+    behind: np.ndarray
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.depth.shape[0], self.depth.shape[1]
+
+    @property
+    def spacing(self) -> np.ndarray:
+        """Root of the area, across the ray, that each pixel covers at its depth; (H, W) float64, the cloud's unit."""
+        side = float(np.sqrt(self.pitch[0] * self.pitch[1]))
+        return side * self.depth if self.viewpoint is not None else np.where(np.isnan(self.depth), np.nan, side)
+
+
+def organized(
+    xyz: np.ndarray, rows: np.ndarray, shape: tuple[int, int], viewpoint: np.ndarray | None = None
+) -> RangeImage:
+    """See an organized cloud as its sensor did.
+
+    Whether the rays leave the viewpoint or are parallel is read off the cloud: whichever makes the steps from pixel to
+    pixel the more even.
+
+    Parameters
+    ----------
+    xyz : (N, 3) float64, finite
+    rows : (N,) int64
+        Place of each point in the flat grid (`edgel.cloud.Points.rows`).
+    shape : (int, int)
+    viewpoint : (3,) float64, optional
+        Default: the origin, where sensors have theirs.
+    """
+    index = np.full(shape[0] * shape[1], -1)
+    index[rows] = np.arange(len(xyz))
+    index = index.reshape(shape)
+    eye = np.zeros(3) if viewpoint is None else viewpoint
+    depth = np.linalg.norm(xyz - eye, axis=1)
+    pairs = _neighbours(index)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rays = (xyz - eye) / depth[:, None]
+    from_eye = [np.linalg.norm(rays[b] - rays[a], axis=1) for a, b in pairs]
+    direction = _parallel(xyz, pairs)
+    across = xyz - (xyz @ direction)[:, None] * direction
+    parallel = [np.linalg.norm(across[b] - across[a], axis=1) for a, b in pairs]
+    middle = rays[depth > 0].mean(axis=0) if (depth > 0).any() else np.array([0.0, 0.0, 1.0])
+    if _unevenness(parallel) < _unevenness(from_eye):
+        facing = direction @ (middle if viewpoint is not None or direction[2] == 0 else -direction * direction[2])
+        direction = -direction if facing < 0 else direction
+        depth, steps, eye, middle = xyz @ direction, parallel, None, direction
+    else:
+        steps = from_eye
+    image = np.full(shape, np.nan)
+    image.ravel()[rows] = depth
+    pitch = [float(np.median(step)) if len(step) else 1.0 for step in steps]
+    return RangeImage(image, index, "organized", (pitch[0], pitch[1]), eye, _unit(middle), np.zeros(len(xyz)))
+
+
+def orthographic(xyz: np.ndarray, direction: np.ndarray) -> RangeImage:
+    """Project points along parallel rays.
+
+    Parameters
+    ----------
+    xyz : (N, 3) float64, finite
+    direction : (3,)
+        In which the viewer looks; (0, 0, -1) looks down.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> x, y = np.meshgrid(np.arange(30.0), np.arange(20.0))
+    >>> image = orthographic(np.c_[x.ravel(), y.ravel(), 0 * x.ravel()], np.array([0, 0, -1]))
+    >>> image.shape, int((image.index >= 0).sum())
+    ((28, 38), 600)
+    """
+    right, down, forward = _axes(direction, np.array([0.0, 0.0, 1.0]))
+    middle = xyz.mean(axis=0)  # far from the origin the image's coordinates would lose their digits
+    picture = (xyz - middle) @ np.column_stack([right, down])
+    return _rastered(xyz, picture, xyz @ forward, "orthographic", None, forward)
+
+
+def pinhole(xyz: np.ndarray, viewpoint: np.ndarray) -> RangeImage:
+    """Project points onto the plane of a camera that looks from the viewpoint at their middle.
+
+    Raises
+    ------
+    ValueError
+        If a point lies beside or behind such a camera.
+    """
+    rays = xyz - viewpoint
+    right, down, forward = _axes(rays.mean(axis=0), np.array([0.0, 0.0, 1.0]))
+    ahead = rays @ forward
+    if not (ahead > 0).all():
+        raise ValueError("viewpoint: some points lie beside or behind a camera there; use a spherical projection")
+    picture = np.column_stack([rays @ right / ahead, rays @ down / ahead])
+    return _rastered(xyz, picture, np.linalg.norm(rays, axis=1), "pinhole", viewpoint, forward)
+
+
+def spherical(xyz: np.ndarray, viewpoint: np.ndarray, up: np.ndarray | None = None) -> RangeImage:
+    """Project points onto a sphere about the viewpoint: azimuth along the rows, elevation along the columns.
+
+    Parameters
+    ----------
+    xyz : (N, 3) float64, finite
+    viewpoint : (3,)
+    up : (3,), optional
+        The sensor's axis; default +Z.
+    """
+    rays = xyz - viewpoint
+    up = np.array([0.0, 0.0, 1.0]) if up is None else up
+    level = rays.mean(axis=0)
+    right, down, forward = _axes(level - (level @ up) * up, up)
+    ahead, aside = rays @ forward, rays @ right
+    picture = np.column_stack([np.arctan2(aside, ahead), np.arctan2(rays @ down, np.hypot(ahead, aside))])
+    return _rastered(xyz, picture, np.linalg.norm(rays, axis=1), "spherical", viewpoint, forward)
+
+
+def _axes(direction: np.ndarray, up: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Right, down and forward of a viewer."""
+    length = np.linalg.norm(direction)
+    forward = direction / length if length > 1e-12 else np.roll(up, 1)
+    if abs(forward @ up) > 0.99 * np.linalg.norm(up):
+        up = np.roll(up, -1)
+    right = np.cross(forward, up)
+    right = right / np.linalg.norm(right)
+    return right, np.cross(forward, right), forward
+
+
+def _rastered(
+    xyz: np.ndarray,
+    picture: np.ndarray,
+    depth: np.ndarray,
+    method: str,
+    viewpoint: np.ndarray | None,
+    forward: np.ndarray,
+) -> RangeImage:
+    """Let each pixel show the nearest of its points."""
+    low, high = picture.min(axis=0), picture.max(axis=0)
+    across, along = image_pitch(picture)
+    growth = np.sqrt(((high - low) / (across, along) + 1).prod() / (_MOST_PIXELS * len(xyz) + 10_000))
+    size = np.array([across, along]) * max(growth, 1.0)
+    # Half a pixel off the lowest point: points of a grid then lie in the middle of their pixels.
+    cells = np.floor((picture - low) / size + 0.5).astype(np.int64) + FRAME
+    width, height = (int(count) for count in np.floor((high - low) / size + 0.5) + 1 + 2 * FRAME)
+    index = np.full(height * width, -1)
+    pixels = cells[:, 1] * width + cells[:, 0]
+    _nearest(pixels, depth, xyz, index)
+    image = np.where(index >= 0, depth[index], np.nan)
+    pitch = (float(size[1]), float(size[0]))
+    front = image[pixels]
+    spacing = np.sqrt(pitch[0] * pitch[1]) * (1.0 if viewpoint is None else np.maximum(front, 1e-300))
+    layout = (height, width)
+    return RangeImage(
+        image.reshape(layout), index.reshape(layout), method, pitch, viewpoint, forward, (depth - front) / spacing
+    )
+
+
+def image_pitch(picture: np.ndarray) -> tuple[float, float]:
+    """Measure how far apart points lie in an image, along its rows and along its columns.
+
+    Parameters
+    ----------
+    picture : (N, 2) float64
+        Place of each point: right, down.
+    """
+    extent = np.ptp(picture, axis=0)
+    if len(picture) < 2 or not extent.any():
+        return 1.0, 1.0
+    side = float(np.sqrt(covered_area(picture) / len(picture)))
+    flat = np.column_stack([picture, np.zeros(len(picture))])
+    index = build_index(flat)
+    places = index.evenly_sampled(_SAMPLE)
+    points = index.order[places]
+    near = knn(index, at_places(index, places), min(9, len(flat)))
+    # The nearest that is elsewhere: clouds repeat points.
+    elsewhere = near.distances > 1e-6 * side
+    first = np.argmax(elsewhere, axis=1)
+    known = elsewhere.any(axis=1)
+    picked = near.points[np.arange(len(points)), first][known]
+    step = np.abs(picture[picked] - picture[points[known]])
+    if len(step) == 0:
+        return side, side
+    right, down = np.median(step, axis=0)
+    if down < _RINGS * right and right < side:
+        return float(right), float(side * side / right)
+    nearest = float(np.median(np.hypot(*step.T)))
+    if nearest > _GRID * side:  # exactly its step: pixels a little smaller or larger would leave out whole columns
+        return nearest, nearest
+    side *= 1.0 if nearest > _EVEN * side else _LOOSE
+    return side, side
+
+
+@kernel
+def _nearest(pixels, depth, xyz, index):
+    for p in range(len(pixels)):
+        q = index[pixels[p]]
+        if q < 0 or depth[p] < depth[q]:
+            index[pixels[p]] = p
+        elif depth[p] == depth[q]:
+            for axis in range(3):  # of two at the same depth the one of smaller coordinates, whatever their order
+                if xyz[p, axis] != xyz[q, axis]:
+                    if xyz[p, axis] < xyz[q, axis]:
+                        index[pixels[p]] = p
+                    break
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / np.linalg.norm(vector)
+
+
+def _neighbours(index: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Pairs of points one below the other, and side by side."""
+    pairs = []
+    for a, b in ((index[:-1], index[1:]), (index[:, :-1], index[:, 1:])):
+        both = (a >= 0) & (b >= 0)
+        pairs.append((a[both], b[both]))
+    return pairs
+
+
+def _parallel(xyz: np.ndarray, pairs: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """Direction along which alone the steps between neighbours differ, as they do where the rays are parallel."""
+    scatter = np.zeros((3, 3))
+    middles = []
+    for a, b in pairs:
+        step = xyz[b] - xyz[a]
+        middles.append(np.median(step, axis=0) if len(step) else np.zeros(3))
+        step = step - middles[-1]
+        scatter += step.T @ step
+    values, vectors = np.linalg.eigh(scatter)
+    across = np.cross(*middles)
+    length = np.linalg.norm(across)
+    count = sum(len(a) for a, _ in pairs)
+    if values[-1] <= 1e-12 * count * length and length > 0:  # one plane: any direction would do
+        return across / length
+    return vectors[:, -1]
+
+
+def _unevenness(steps: list[np.ndarray]) -> float:
+    """Median deviation of the steps from their median, relative to it, the larger of both directions."""
+    worst = 0.0
+    for step in steps:
+        middle = np.median(step) if len(step) else 0.0
+        worst = max(worst, float(np.median(np.abs(step - middle)) / middle) if middle > 0 else np.inf)
+    return worst

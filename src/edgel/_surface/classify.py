@@ -1,0 +1,63 @@
+"""Classification: which of the points where an edge could be lie on a crease, and where the surface ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from edgel._neighbors.kdtree import NeighborIndex
+from edgel._surface.evidence import Evidence, gather_evidence, with_context
+from edgel._surface.forest import evaluate, load_forests
+from edgel._surface.screen import Screening
+
+SECOND = 0.02  # least probability of an edge, by a point's own evidence, for looking at its context
+_BLOCK = 65_536  # points whose evidence is held at a time
+
+
+@dataclass(frozen=True, eq=False)
+class Classification:
+    """How likely some points are edge points; all others are none.
+
+    Attributes
+    ----------
+    points : (M,) int64
+        Ascending.
+    crease, outline : (M,) float64
+        Probability that a crease runs through the cell of each point, and that the surface ends there.
+    evidence : Evidence
+    """
+
+    points: np.ndarray
+    crease: np.ndarray
+    outline: np.ndarray
+    evidence: Evidence
+
+    def take(self, some: np.ndarray) -> Classification:
+        """Return the classification of some of these points."""
+        return Classification(self.points[some], self.crease[some], self.outline[some], self.evidence.take(some))
+
+
+def classify(index: NeighborIndex, screening: Screening) -> Classification:
+    """Classify the candidates of a screening by their own evidence, and the likely ones again by their context."""
+    trees, candidates = load_forests(), screening.candidates
+    kept, parts, probabilities = [], [], []
+    for start in range(0, len(candidates), _BLOCK):
+        places = candidates[start : start + _BLOCK]
+        evidence = gather_evidence(index, screening, places)
+        first = np.stack([evaluate(trees[f"first {kind}"], evidence.features) for kind in ("crease", "outline")])
+        likely = np.flatnonzero((first > SECOND).any(axis=0))
+        kept.append(places[likely])
+        probabilities.append(first[:, likely])
+        parts.append(evidence.take(likely))
+    places = np.concatenate([np.zeros(0, np.int64), *kept])
+    (crease, outline), evidence = np.concatenate([np.zeros((2, 0)), *probabilities], axis=1), Evidence.join(parts)
+    features = with_context(index, places, evidence, crease, outline)
+    points = index.order[places]
+    ascending = np.argsort(points)
+    return Classification(
+        points[ascending],
+        evaluate(trees["crease"], features)[ascending],
+        evaluate(trees["outline"], features)[ascending],
+        evidence.take(ascending),
+    )

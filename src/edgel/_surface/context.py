@@ -1,0 +1,180 @@
+"""Context: how likely the neighbours of a likely edge point are edge points, along the edge and beside it.
+
+An edge is a chain one point thick: a point is the likelier on it the surer the points before and behind it are, and the
+less likely the surer those beside it are. This is Canny's non-maximum suppression and hysteresis, learned.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from edgel._kernels.eigen import smallest_eigenpair
+from edgel._kernels.parallel import kernel
+from edgel._neighbors.spacing import disc_spacing
+from edgel._surface.neighborhood import relative
+
+NEIGHBORS = 24
+
+OWN, ALIGNMENT, AGREEMENT, FIRST, SECOND, THIRD, MEAN_8, MEAN_16, MEAN_ALL, OTHER_OWN, OTHER_BEST = range(11)
+AHEAD, BEHIND, OVER_BESIDE, LINE_AHEAD, LINE_BEHIND, RIVALS, NEARER_RIVAL, FOOT_AWAY = range(11, 19)
+FEATURES = {
+    "own": "probability of this kind of edge at the point",
+    "alignment": "how far the neighbours' probabilities lie on a line, 0 to 1",
+    "agreement": "cosine between that line and the edge's own",
+    "first": "largest probability among the 8 nearest",
+    "second": "second largest",
+    "third": "third largest",
+    "mean_8": "mean probability of the 8 nearest",
+    "mean_16": "mean of the 16 nearest",
+    "mean_all": "mean of all",
+    "other_own": "probability of the other kind at the point",
+    "other_best": "largest probability of the other kind among the 8 nearest",
+    "ahead": "largest probability before or behind the point along the probabilities' line",
+    "behind": "largest on the other side of it",
+    "over_beside": "probability of the point less the largest beside it",
+    "line_ahead": "largest probability, times agreement, before or behind the point along its own line",
+    "line_behind": "largest on the other side of it",
+    "rivals": "sum of those beside it that place the edge on the same line",
+    "nearer_rival": "by how much the nearest of them is nearer to the line, in spacings",
+    "foot_away": "distance of the point from its own line, in spacings, at most 4",
+}
+NUM_FEATURES = len(FEATURES)
+_AHEAD, _ASIDE = 0.8, 0.6  # cosines to the edge: neighbours before and behind it, and beside it
+_FAR, _BESIDE = 3.0, 1.8  # spacings within which they lie
+_SAME_LINE = 0.35  # spacings between lines that two points beside each other put the same edge on
+
+
+@kernel
+def gather_context(first, places, squared, queries, targets, xyz, chances, slot, lines, feet, features):
+    """Describe the probabilities of each of two kinds of edge around some points.
+
+    Parameters: the probability of either kind at every place, (2, N) float32; which row of `lines` and `feet` (M, 3),
+    the direction of its line and the foot on it, is its own, (N,) int32, -1 for none. Writes `features`, `FEATURES` of
+    either kind (2, Q, 19).
+    """
+    away = np.empty((3, places.shape[1]))
+    for q in range(places.shape[0]):
+        row, spacing = targets[first + q], disc_spacing(squared[q])
+        if spacing == 0.0:
+            features[:, row] = 0.0
+            continue
+        relative(places[q], queries, first + q, xyz, away)
+        away /= spacing
+        for kind in range(2):
+            _describe(
+                places[q], away, spacing, chances[kind], chances[1 - kind], slot, lines, feet, features[kind, row]
+            )
+
+
+@kernel
+def _describe(places, away, spacing, chance, other, slot, lines, feet, out):
+    """Describe the probabilities of one kind of edge around a point."""
+    out[:] = 0.0
+    own, s = chance[places[0]], slot[places[0]]
+    tx, ty, tz, line_like = _main_direction(places, away, chance)
+    agree = abs(lines[s, 0] * tx + lines[s, 1] * ty + lines[s, 2] * tz) if s >= 0 else 0.0
+    out[OWN], out[ALIGNMENT], out[AGREEMENT] = own, line_like, agree
+    _sums(places, chance, other, out)
+    _along_and_across(places, away, chance, tx, ty, tz, own, out)
+    if s >= 0:
+        _along_and_across_line(places, away, chance, slot, lines, feet, s, spacing, out)
+
+
+@kernel
+def _main_direction(places, away, chance):
+    """Direction along which the probabilities lie, and how far they lie on a line, 0 to 1."""
+    xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(1, len(places)):
+        w = chance[places[i]]
+        x, y, z = away[0, i], away[1, i], away[2, i]
+        xx, xy, xz, yy, yz, zz = (
+            xx + w * x * x,
+            xy + w * x * y,
+            xz + w * x * z,
+            yy + w * y * y,
+            yz + w * y * z,
+            zz + w * z * z,
+        )
+    trace = xx + yy + zz
+    if not trace > 0.0:
+        return 1.0, 0.0, 0.0, 0.0
+    # The largest eigenvector of a matrix is the smallest one of its negative.
+    largest, middle, x, y, z = smallest_eigenpair(-xx, -xy, -xz, -yy, -yz, -zz)
+    return x, y, z, (middle - largest) / trace
+
+
+@kernel
+def _sums(places, chance, other, out):
+    """Write the three largest probabilities of the 8 nearest, means over 8, 16 and all, and the other kind's largest."""
+    a, b, c, total, others = 0.0, 0.0, 0.0, 0.0, 0.0
+    k = len(places)
+    for i in range(1, k):
+        p = chance[places[i]]
+        total += p
+        if i <= 8:
+            if p > a:
+                a, b, c = p, a, b
+            elif p > b:
+                b, c = p, b
+            elif p > c:
+                c = p
+            others = max(others, other[places[i]])
+        if i == min(8, k - 1):
+            out[MEAN_8] = total / i
+        if i == min(16, k - 1):
+            out[MEAN_16] = total / i
+    out[FIRST], out[SECOND], out[THIRD], out[MEAN_ALL] = a, b, c, total / max(k - 1, 1)
+    out[OTHER_OWN], out[OTHER_BEST] = other[places[0]], others
+
+
+@kernel
+def _along_and_across(places, away, chance, tx, ty, tz, own, out):
+    """Write the largest probabilities before and behind the point, and beside it, by the direction in which they lie."""
+    ahead, behind, beside = 0.0, 0.0, 0.0
+    for i in range(1, len(places)):
+        x, y, z = away[0, i], away[1, i], away[2, i]
+        far = math.sqrt(x * x + y * y + z * z)
+        if far > _FAR or far == 0.0:
+            continue
+        cosine = (x * tx + y * ty + z * tz) / far
+        p = chance[places[i]]
+        if cosine > _AHEAD:
+            ahead = max(ahead, p)
+        elif cosine < -_AHEAD:
+            behind = max(behind, p)
+        elif abs(cosine) < _ASIDE and far < _BESIDE:
+            beside = max(beside, p)
+    out[AHEAD], out[BEHIND], out[OVER_BESIDE] = max(ahead, behind), min(ahead, behind), own - beside
+
+
+@kernel
+def _along_and_across_line(places, away, chance, slot, lines, feet, s, spacing, out):
+    """The same by the point's own line, and what those beside it that see the same line make of it."""
+    tx, ty, tz = lines[s, 0], lines[s, 1], lines[s, 2]
+    fx, fy, fz = feet[s, 0] / spacing, feet[s, 1] / spacing, feet[s, 2] / spacing
+    own_away = math.sqrt(fx * fx + fy * fy + fz * fz)
+    ahead, behind, rivals, nearer = 0.0, 0.0, 0.0, -2.0
+    for i in range(1, len(places)):
+        x, y, z = away[0, i], away[1, i], away[2, i]
+        far = math.sqrt(x * x + y * y + z * z)
+        j = slot[places[i]]
+        if far > _FAR or far == 0.0 or j < 0:
+            continue
+        cosine = (x * tx + y * ty + z * tz) / far
+        p = chance[places[i]] * abs(tx * lines[j, 0] + ty * lines[j, 1] + tz * lines[j, 2])
+        if cosine > _AHEAD:
+            ahead = max(ahead, p)
+        elif cosine < -_AHEAD:
+            behind = max(behind, p)
+        elif abs(cosine) < _ASIDE:
+            gx, gy, gz = feet[j, 0] / spacing, feet[j, 1] / spacing, feet[j, 2] / spacing
+            dx, dy, dz = x + gx - fx, y + gy - fy, z + gz - fz
+            along = dx * tx + dy * ty + dz * tz
+            apart = math.sqrt(max(dx * dx + dy * dy + dz * dz - along * along, 0.0))
+            if apart < _SAME_LINE and p > 0.1:
+                rivals += p
+                nearer = max(nearer, own_away - math.sqrt(gx * gx + gy * gy + gz * gz))
+    out[LINE_AHEAD], out[LINE_BEHIND] = max(ahead, behind), min(ahead, behind)
+    out[RIVALS], out[NEARER_RIVAL], out[FOOT_AWAY] = rivals, nearer, min(own_away, 4.0)

@@ -1,0 +1,107 @@
+"""Where exactly an edge runs, and the surface on either side: from the best of the fits of two planes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from edgel._surface import hinge
+from edgel._surface.evidence import MIN_TURN, Evidence
+
+
+@dataclass(frozen=True, eq=False)
+class Faces:
+    """The geometry of edges at some points; NaN where no fit explains the point.
+
+    Attributes
+    ----------
+    position : (M, 3) float64
+        Foot of the point on the line in which the planes meet.
+    direction : (M, 3) float64
+        Unit tangent of that line.
+    normals : (M, 2, 3) float64
+        Unit normals of both planes, on the side the viewer is on.
+    angle : (M,) float64
+        Turn from one plane to the other, radians, 0 to pi.
+    convex : (M,) int8
+        1 where the side of the normals is the outside of the wedge, -1 where it is the inside, 0 where unknown.
+    """
+
+    position: np.ndarray
+    direction: np.ndarray
+    normals: np.ndarray
+    angle: np.ndarray
+    convex: np.ndarray
+
+    def spread(self, rows: np.ndarray, own: np.ndarray, xyz: np.ndarray, normals: np.ndarray) -> Faces:
+        """Put the faces found at the points `own` (M,) among the edge points `rows` (E,), both ascending.
+
+        Where none are known, the position is the point (E, 3) itself and the first normal that of its one plane (E, 3).
+        """
+        known = np.isin(own, rows) & (self.convex != 0)
+        at = np.searchsorted(rows, own[known])
+        whole = Faces(
+            position=xyz.copy(),
+            direction=np.full((len(rows), 3), np.nan),
+            normals=np.stack([normals, np.full_like(normals, np.nan)], axis=1),
+            angle=np.full(len(rows), np.nan),
+            convex=np.zeros(len(rows), np.int8),
+        )
+        for name in self.__dataclass_fields__:
+            getattr(whole, name)[at] = getattr(self, name)[known]
+        return whole
+
+
+def localize(evidence: Evidence, xyz: np.ndarray, viewpoint: np.ndarray | None) -> Faces:
+    """Say where exactly the edge runs, and how the surface lies on either side of it, at each point (M, 3) by the fit that places it best (`Evidence.fit`).
+
+    Normals are turned towards the viewpoint, or upwards (+Z) without one.
+    """
+    found = evidence.fit.astype(np.float64)
+    a, b, line, foot, middle_a, middle_b = (
+        found[:, i : i + 3]
+        for i in (
+            hinge.FIRST_NORMAL,
+            hinge.SECOND_NORMAL,
+            hinge.LINE,
+            hinge.FOOT,
+            hinge.FIRST_CENTROID,
+            hinge.SECOND_CENTROID,
+        )
+    )
+    wing_a, wing_b = _wing(middle_a - foot, line), _wing(middle_b - foot, line)
+    turn = math.pi - np.arccos(np.clip((wing_a * wing_b).sum(axis=1), -1, 1))
+    known = evidence.placed & (turn > MIN_TURN)
+    # Turned so that each normal points away from the other face's wing, both lie on the outside of the wedge.
+    a, b = _away_from(a, wing_b), _away_from(b, wing_a)
+    out = a + b
+    if viewpoint is None:
+        inside = (out[:, 2] < 0) | ((out[:, 2] == 0) & ((out[:, 1] < 0) | ((out[:, 1] == 0) & (out[:, 0] < 0))))
+    else:
+        inside = ((viewpoint - xyz) * out).sum(axis=1) < 0
+    sign = np.where(inside, -1.0, 1.0)
+    # The face that the viewer sees better comes first.
+    sight = np.array([0.0, 0.0, 1.0]) if viewpoint is None else viewpoint - xyz
+    swap = sign[:, None] * ((b - a) * sight).sum(axis=1, keepdims=True) > 0
+    a, b = np.where(swap, b, a), np.where(swap, a, b)
+    unknown = np.where(known, 1.0, np.nan)[:, None]
+    return Faces(
+        position=xyz + foot * unknown,
+        direction=line * unknown,
+        normals=np.stack([a, b], axis=1) * (sign[:, None] * unknown)[:, None],
+        angle=turn * unknown[:, 0],
+        convex=np.where(known, sign, 0).astype(np.int8),
+    )
+
+
+def _wing(into: np.ndarray, line: np.ndarray) -> np.ndarray:
+    """Unit vectors from the line into a face."""
+    across = into - (into * line).sum(axis=1, keepdims=True) * line
+    length = np.linalg.norm(across, axis=1, keepdims=True)
+    return across / np.where(length > 0, length, np.nan)
+
+
+def _away_from(normals: np.ndarray, wing: np.ndarray) -> np.ndarray:
+    return np.where((normals * wing).sum(axis=1, keepdims=True) > 0, -normals, normals)

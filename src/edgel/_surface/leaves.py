@@ -1,0 +1,136 @@
+"""Leaves of the k-d tree: the first screening, by handfuls of neighbouring points.
+
+Where a leaf and those around it lie on one smooth surface, no point of it needs neighbours of its own. There are a dozen
+times fewer leaves than points, so screening them costs next to nothing and spares most of a large cloud the rest.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from edgel._kernels.moments import add_moments, move_moments, plane_of_moments
+from edgel._kernels.parallel import kernel, run_slices
+from edgel._neighbors.candidates import every_point
+from edgel._neighbors.kdtree import NeighborIndex, build_index, node_start
+from edgel._neighbors.knn import visit_neighbors
+
+PLANAR = 0.01  # surface variation whose planarity is 1 / e
+GROUPS = (1, 4, 8, 12)  # leaves of each group that a plane is fitted to: the leaf and those nearest to it
+
+VARIATION, OFF_PLANE, OFF_CENTRE, SIZE = range(4)
+OF_GROUP = {
+    "variation": "log of the surface variation of the group",
+    "off_plane": "distance of the leaf's centroid from the group's plane, in sizes of the leaf",
+    "off_centre": "distance of the leaf's centroid from the group's along the plane, in the same",
+    "size": "size of the group (root of the summed variance), in the same",
+}
+TURN, UNLIKE, BENT, COUNT = range(4 * len(GROUPS), 4 * len(GROUPS) + 4)
+OF_LEAF = {
+    "turn": "log of the largest 1 - cos of the angle to the plane of another leaf, weighed by planarity",
+    "unlike": "the same, not weighed",
+    "bent": "log of the largest surface variation of the other leaves",
+    "count": "points in the leaf",
+}
+NUM_FEATURES = len(GROUPS) * len(OF_GROUP) + len(OF_LEAF)
+
+# Columns of the sums of each leaf, after the moments about its centroid, and of its plane, after normal and centroid.
+_CENTROID, _SUMS = 10, 13
+_VARIATION, _PLANE = 6, 7
+
+
+@dataclass(frozen=True, eq=False)
+class Leaves:
+    """What is known of the leaves of an index.
+
+    Attributes
+    ----------
+    features : (L, NUM_FEATURES) float32
+    planes : (L, 4) float64
+        Normal and planarity of the plane fitted to each.
+    nearest : (L, 12) int32
+        The leaves nearest to each, itself first; fewer where there are not as many.
+    """
+
+    features: np.ndarray
+    planes: np.ndarray
+    nearest: np.ndarray
+
+
+def describe_leaves(index: NeighborIndex) -> Leaves:
+    """Fit planes to each leaf of an index and to groups of leaves around it."""
+    leaves = len(index.boxes) // 2
+    sums, planes = np.empty((leaves, _SUMS)), np.empty((leaves, _PLANE))
+    run_slices(_sum, leaves, index.xyz, leaves, sums, planes, size=1024)
+    features = np.zeros((leaves, NUM_FEATURES), np.float32)
+    centroids = build_index(np.ascontiguousarray(sums[:, _CENTROID:]))
+    k = min(GROUPS[-1], leaves)
+    nearest = np.empty((leaves, k), np.int32)
+    arguments = (centroids.order, sums, planes, np.array(GROUPS), features, nearest)
+    visit_neighbors(_describe, every_point(centroids), centroids, k, *arguments)
+    planarity = np.exp(-planes[:, _VARIATION] / PLANAR)
+    return Leaves(features, np.column_stack([planes[:, :3], planarity]), nearest)
+
+
+@kernel
+def _sum(start, stop, xyz, leaves, sums, planes):
+    """Moments of each leaf about its own centroid, the centroid, and the leaf's plane."""
+    vectors = np.empty((3, 64))
+    for leaf in range(start, stop):
+        first, last = node_start(leaf, xyz.shape[1], leaves), node_start(leaf + 1, xyz.shape[1], leaves)
+        count, out = last - first, sums[leaf]
+        for axis in range(3):
+            middle = 0.0
+            for p in range(first, last):
+                middle += xyz[axis, p] - xyz[axis, first]
+            out[_CENTROID + axis] = xyz[axis, first] + middle / count
+            for p in range(first, last):
+                vectors[axis, p - first] = xyz[axis, p] - out[_CENTROID + axis]
+        out[:_CENTROID] = 0.0
+        out[0] = count
+        add_moments(vectors, 0, count, out[1:])
+        plane = planes[leaf]
+        left = plane_of_moments(out, plane)
+        plane[_VARIATION] = left / max(out[4] + out[7] + out[9], 1e-300)
+
+
+@kernel
+def _describe(first, places, squared, queries, targets, xyz, order, sums, planes, groups, features, nearest):
+    """Write `OF_GROUP` of each group, then `OF_LEAF`."""
+    whole, plane = np.empty(10), np.empty(6)
+    for q in range(places.shape[0]):
+        leaf = targets[first + q]
+        own, out, done = planes[leaf], features[leaf], 0
+        for i in range(places.shape[1]):
+            nearest[leaf, i] = order[places[q, i]]
+        whole[:] = 0.0
+        size = math.sqrt(max(sums[leaf, 4] + sums[leaf, 7] + sums[leaf, 9], 0.0) / sums[leaf, 0])
+        for g in range(len(groups)):
+            count = min(groups[g], places.shape[1])
+            for i in range(done, count):
+                other = sums[order[places[q, i]]]
+                x, y, z = other[10] - sums[leaf, 10], other[11] - sums[leaf, 11], other[12] - sums[leaf, 12]
+                move_moments(other, x, y, z, whole)
+            done = count
+            left = plane_of_moments(whole, plane)
+            cx, cy, cz = plane[3], plane[4], plane[5]
+            n = whole[0]
+            trace = whole[4] + whole[7] + whole[9] - n * (cx * cx + cy * cy + cz * cz)
+            off = plane[0] * cx + plane[1] * cy + plane[2] * cz
+            of_group = out[4 * g : 4 * g + 4]
+            of_group[VARIATION] = math.log(left / max(trace, 1e-300) + 1e-6)
+            of_group[OFF_PLANE] = abs(off) / max(size, 1e-300)
+            of_group[OFF_CENTRE] = math.sqrt(max(cx * cx + cy * cy + cz * cz - off * off, 0.0)) / max(size, 1e-300)
+            of_group[SIZE] = math.sqrt(max(trace, 0.0) / n) / max(size, 1e-300)
+        turn, bent, unlike = 0.0, 0.0, 0.0
+        for i in range(1, places.shape[1]):
+            other = planes[order[places[q, i]]]
+            cosine = abs(own[0] * other[0] + own[1] * other[1] + own[2] * other[2])
+            flat = math.exp(-min(max(own[_VARIATION], other[_VARIATION]) / PLANAR, 50.0))
+            turn = max(turn, flat * (1.0 - cosine))
+            unlike = max(unlike, 1.0 - cosine)
+            bent = max(bent, other[_VARIATION])
+        out[TURN], out[UNLIKE], out[BENT] = math.log(turn + 1e-6), math.log(unlike + 1e-6), math.log(bent + 1e-6)
+        out[COUNT] = sums[leaf, 0]

@@ -1,0 +1,71 @@
+"""The command line and the Python lines that find again what is seen."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from pathlib import Path
+
+from edgel._detect import DEFAULT_KINDS
+from edgel._labels import LIKELY
+from edgel._viewer.session import Pane
+from edgel._viewer.settings import Settings
+from edgel.edges import kind_names
+
+
+def command_line(pane: Pane, settings: Settings) -> str:
+    """Write the ``edgel detect`` that finds exactly the edges of a pane."""
+    words = ["edgel", "detect", pane.source.path]
+    if pane.source.intrinsics is not None:
+        words += ["--intrinsics", str(pane.source.intrinsics)]
+    if settings.scale > 1:
+        words += ["--scale", f"{settings.scale:g}"]
+    if pane.preset == "paper":
+        words += ["--preset", "paper"]
+    else:
+        if not settings.kinds:
+            return "# no kind of edge is chosen"
+        if settings.kinds != DEFAULT_KINDS:
+            words += ["--kinds", ",".join(kind_names(settings.kinds))]
+        if settings.strength != LIKELY:
+            words += ["--min-strength", f"{settings.strength:g}"]
+        if settings.angle > 0:
+            words += ["--min-angle", f"{math.degrees(settings.angle):g}"]
+    if settings.is_cropped:
+        words += ["--crop", *map(repr, pane.box.ravel().tolist())]
+    return shlex.join([*words, "-o", output_name(pane)])
+
+
+def python_lines(pane: Pane, settings: Settings) -> str:
+    """Write the Python that finds exactly the edges of a pane."""
+    default = pane.preset == "default"
+    if default and not settings.kinds:
+        return "# no kind of edge is chosen"
+    options = []
+    if default and settings.kinds != DEFAULT_KINDS:
+        options.append(f"kinds={kind_names(settings.kinds)!r}")
+    if default and settings.strength != LIKELY:
+        options.append(f"min_strength={settings.strength:g}")
+    if not default:
+        options.append("preset='paper'")
+    camera = "" if pane.source.intrinsics is None else f", intrinsics={str(pane.source.intrinsics)!r}"
+    lines = ["import edgel", "", f"cloud = edgel.read({pane.source.path!r}{camera})"]
+    function = f"edgel.detect_at_scale(cloud, {settings.scale:g}" if settings.scale > 1 else "edgel.detect(cloud"
+    lines.append(f"edges = {', '.join([function, *options])})")
+    if default and settings.angle > 0:
+        lines[0] = "import math\n\nimport edgel"
+        lines.append(f"edges = edges.drop_blunt(math.radians({math.degrees(settings.angle):g}))")
+    if settings.is_cropped:
+        corners = [", ".join(map(_number, corner)) for corner in pane.box.tolist()]
+        lines.append(f"edges = edges.crop(cloud, [[{corners[0]}], [{corners[1]}]])")
+    lines.append(f"edgel.write({output_name(pane)!r}, edges.to_cloud(cloud))")
+    return "\n".join(lines)
+
+
+def output_name(pane: Pane, extension: str = ".ply") -> str:
+    """Return a name for the edges of a pane, in no folder."""
+    return f"{Path(pane.source.path).stem}_{'paper_' if pane.preset == 'paper' else ''}edges{extension}"
+
+
+def _number(value: float) -> str:
+    return repr(value) if math.isfinite(value) else f"float('{value}')"

@@ -1,0 +1,113 @@
+"""The server of the page: who may reach it, and how it begins and ends."""
+
+from __future__ import annotations
+
+import functools
+import io
+import os
+import re
+import socket
+import sys
+import threading
+import webbrowser
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, redirect_stdout
+
+import viser
+import websockets.asyncio.server
+
+from edgel._viewer.page import Page
+from edgel._viewer.session import Session
+
+LOCAL = ("127.0.0.1", "localhost", "::1")
+DEFAULT_PORT = 8080
+_TRIED_PORTS = 100
+# Any page in the browser may try to connect to this machine. Only those that came from it are let in.
+_LOCAL_PAGES = re.compile(r"https?://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?")
+
+
+def serve(
+    paths: Sequence[str],
+    *,
+    host: str = LOCAL[0],
+    port: int | None = None,
+    intrinsics: str | None = None,
+    open_browser: bool = True,
+    ready: Callable[[str], None] = lambda url: None,
+) -> None:
+    """Show files in the browser until the program is interrupted.
+
+    Parameters
+    ----------
+    paths : sequence of str
+    host : str
+        Address to listen at.
+    port : int, optional
+        Default: the first free one from 8080.
+    intrinsics : str, optional
+        The camera of depth images.
+    open_browser : bool
+    ready : callable
+        Called with the page's address once it can be reached.
+
+    Raises
+    ------
+    OSError
+        If nothing can listen at that address.
+    """
+    with running(paths, host=host, port=port, intrinsics=intrinsics) as (server, _, _):
+        shown = "localhost" if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
+        url = f"http://{shown}:{server.get_port()}"
+        ready(url)
+        if open_browser and _has_screen():
+            webbrowser.open(url)
+        while True:
+            threading.Event().wait(3600)  # in one endless wait Windows would not see Ctrl-C
+
+
+@contextmanager
+def running(
+    paths: Sequence[str], *, host: str = LOCAL[0], port: int | None = None, intrinsics: str | None = None
+) -> Iterator[tuple[viser.ViserServer, Session, Page]]:
+    """Serve the page for as long as the ``with`` lasts; as `serve`, which waits for Ctrl-C."""
+    session = Session(paths, intrinsics=intrinsics)
+    server = _listen(host, _free_port(host, port))
+    page = Page(server, session)
+    try:
+        yield server, session, page
+    finally:
+        session.close()
+        page.close()
+        with redirect_stdout(io.StringIO()):
+            server.stop()
+
+
+def _listen(host: str, port: int) -> viser.ViserServer:
+    """Start viser without its banner, and closed to pages from elsewhere unless the address is open anyway."""
+    original = websockets.asyncio.server.serve
+    if host in LOCAL:
+        websockets.asyncio.server.serve = functools.partial(original, origins=[_LOCAL_PAGES, None])
+    try:
+        with redirect_stdout(io.StringIO()):
+            return viser.ViserServer(host, port, verbose=False)
+    finally:
+        websockets.asyncio.server.serve = original
+
+
+def _free_port(host: str, port: int | None) -> int:
+    """Return a port that can be listened at; viser itself would try a thousand and then wait for ever."""
+    tried = range(DEFAULT_PORT, DEFAULT_PORT + _TRIED_PORTS) if port is None else [port]
+    error = OSError("no free port")
+    for candidate in tried:
+        try:
+            family = socket.AF_INET6 if ":" in host else socket.AF_INET
+            with socket.create_server((host, candidate), family=family):
+                return candidate
+        except OSError as problem:
+            error = problem
+    raise error
+
+
+def _has_screen() -> bool:
+    """Whether a browser can show anything; else Python would open one in the terminal."""
+    return sys.platform in ("win32", "darwin") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

@@ -1,0 +1,138 @@
+import naive
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.spatial import KDTree
+
+from edgel._neighbors.kdtree import BUCKET, bounds, build_index, node_start
+from edgel._neighbors.knn import knn
+
+# Few different coordinates, so that ties and duplicates are the rule.
+LATTICE = arrays(np.float64, st.tuples(st.integers(1, 60), st.just(3)), elements=st.integers(-3, 3).map(float))
+
+
+def cloud(kind, n=3000, seed=0):
+    rng = np.random.default_rng(seed)
+    if kind == "uniform":
+        return rng.random((n, 3))
+    if kind == "surface":
+        xy = rng.random((n, 2)) * 10
+        return np.c_[xy, np.sin(xy).sum(axis=1)]
+    if kind == "lidar":  # density falls with the square of the range
+        r, a = 1 / rng.uniform(0.01, 1, n), rng.uniform(0, 2 * np.pi, n)
+        return np.c_[r * np.cos(a), r * np.sin(a), rng.normal(0, 0.1, n)]
+    if kind == "utm":
+        return rng.random((n, 3)) * [1, 1, 0.1] + [5e5, 5e6, 300]
+    if kind == "outlier":
+        return np.r_[rng.random((n - 1, 3)), [[1e9, -1e9, 1e9]]]
+    if kind == "duplicates":
+        return np.repeat(rng.random((n // 10, 3)), 10, axis=0)
+    if kind == "line":
+        return np.c_[rng.random(n), np.zeros(n), np.zeros(n)]
+    raise ValueError(kind)
+
+
+KINDS = ["uniform", "surface", "lidar", "utm", "outlier", "duplicates", "line"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("k", [1, 7, 40])
+def test_distances_are_those_of_scipy(kind, k):
+    points = cloud(kind)
+    found = knn(build_index(points), points, k)
+    expected, _ = KDTree(points).query(points, k)
+    np.testing.assert_allclose(found.distances, expected.reshape(len(points), k), rtol=1e-9, atol=1e-9)
+    real = np.linalg.norm(points[found.points] - points[:, None], axis=2)
+    np.testing.assert_allclose(found.distances, real, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["uniform", "surface", "lidar"])
+def test_sets_are_those_of_scipy(kind):
+    points = cloud(kind)
+    found = knn(build_index(points), points, 16)
+    _, expected = KDTree(points).query(points, 16)
+    np.testing.assert_array_equal(np.sort(found.points, axis=1), np.sort(expected, axis=1))
+
+
+@given(LATTICE, st.integers(1, 20), st.integers(0, 2**32 - 1))
+def test_ties_go_as_in_the_naive_search(points, k, seed):
+    k = min(k, len(points))
+    query = np.random.default_rng(seed).integers(-3, 4, 3).astype(float)
+    found = knn(build_index(points), query[None], k)
+    assert found.points[0].tolist() == naive.nearest(points.tolist(), query.tolist(), k)
+
+
+@given(LATTICE, st.randoms(use_true_random=False))
+def test_order_of_the_input_changes_nothing(points, random):
+    shuffled = list(range(len(points)))
+    random.shuffle(shuffled)
+    k = min(5, len(points))
+    a = knn(build_index(points), points, k)
+    b = knn(build_index(points[shuffled]), points, k)
+    np.testing.assert_array_equal(points[a.points], points[shuffled][b.points])
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 40))
+def test_many_points_at_few_places(seed, k):
+    rng = np.random.default_rng(seed)
+    points = rng.permutation(np.r_[np.zeros((300, 3)), np.ones((200, 3)), rng.integers(0, 4, (40, 3)) / 2.0])
+    queries = np.r_[np.zeros((1, 3)), np.ones((1, 3)), rng.normal(size=(6, 3))]
+    found = knn(build_index(points), queries, k)
+    for rows, query in zip(found.points, queries, strict=True):
+        assert rows.tolist() == naive.nearest(points.tolist(), query.tolist(), k)
+
+
+def test_what_a_sensor_did_not_see_at_the_origin_costs_no_more_than_the_rest():
+    points = np.r_[np.zeros((200_000, 3)), cloud("surface", 2000) + 1]
+    found = knn(build_index(points), points[::997], 16)
+    np.testing.assert_array_equal(found.points[0], np.arange(16))
+    assert (found.distances[0] == 0).all()
+
+
+def test_queries_need_not_be_points_of_the_cloud():
+    points = cloud("surface")
+    queries = np.random.default_rng(1).normal(0, 20, (500, 3))
+    found = knn(build_index(points), queries, 9)
+    expected, _ = KDTree(points).query(queries, 9)
+    np.testing.assert_allclose(found.distances, expected, rtol=1e-12)
+
+
+def test_any_number_of_threads_gives_the_same(monkeypatch):
+    points = cloud("lidar", 20_000)
+    monkeypatch.setenv("EDGEL_NUM_THREADS", "1")
+    one = knn(build_index(points), points, 16)
+    monkeypatch.setenv("EDGEL_NUM_THREADS", "4")
+    four = knn(build_index(points), points, 16)
+    np.testing.assert_array_equal(one.points, four.points)
+    np.testing.assert_array_equal(one.distances, four.distances)
+
+
+def test_number_of_threads_is_checked(monkeypatch):
+    monkeypatch.setenv("EDGEL_NUM_THREADS", "many")
+    with pytest.raises(ValueError, match="EDGEL_NUM_THREADS"):
+        build_index(cloud("uniform"))
+
+
+@pytest.mark.parametrize("n", [1, 2, 16, 17, 65, 70_001])
+def test_index_holds_every_point_once_and_its_boxes_hold_the_points(n):
+    points = cloud("uniform", n)
+    index = build_index(points)
+    assert sorted(index.order.tolist()) == list(range(n))
+    np.testing.assert_array_equal(index.xyz.T, points[index.order])
+    lower, upper = bounds(points)
+    np.testing.assert_array_equal(lower, points.min(axis=0))
+    np.testing.assert_array_equal(upper, points.max(axis=0))
+    leaves = len(index.boxes) // 2
+    for leaf in np.random.default_rng(0).integers(0, leaves, 20):
+        inside = index.xyz[:, node_start(leaf, n, leaves) : node_start(leaf + 1, n, leaves)]
+        assert 0 < inside.shape[1] <= BUCKET
+        np.testing.assert_array_equal(index.boxes[leaves + leaf], np.r_[inside.min(axis=1), inside.max(axis=1)])
+    np.testing.assert_array_equal(index.boxes[1], np.r_[lower, upper])
+
+
+@pytest.mark.parametrize("k", [0, 4])
+def test_more_neighbours_than_points_are_refused(k):
+    with pytest.raises(ValueError, match="num_neighbors: expected 1 to 3"):
+        knn(build_index(np.eye(3)), np.eye(3), k)
