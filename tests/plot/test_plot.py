@@ -3,6 +3,7 @@
 import doctest
 import importlib
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -248,8 +249,10 @@ def test_arrows_need_one_normal_each():
 
 
 def test_full_size_scan_is_drawn_with_its_outline():
-    scan = synth.scan(synth.tee(), num_points=200_000)
-    outline = scan.nearest_seen.distance < 1.0
+    solid = synth.tee()
+    scan = synth.scan(solid, num_points=200_000)
+    flat = [replace(edge, points=edge.points * (1, 1, 0)) for edge in solid.edges]
+    outline = synth.nearest_edge(scan.cloud.xyz * (1, 1, 0), flat).distance < 1.0
     picture = plot.render(scan.cloud, rows_on_top=outline, direction="top", crop=True)
     assert picture.shape[0] / picture.shape[1] == pytest.approx(162.15 / 210, abs=0.02)
     assert not white(picture)[400:500, 400:700].any()

@@ -17,7 +17,7 @@ from edgel.synth.solid import flat_normals, grid_triangles
 from edgel.synth.truth import CREASE_TURN, STEP
 
 BLOCK, FRUSTUM = synth.stepped_block(), synth.frustum()
-BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
 
 def depth_of(scene):

@@ -11,13 +11,26 @@ import numpy as np
 
 from edgel import paper, plot, synth
 from edgel._demo.measure import NUM_NEIGHBORS, Measurement, Times, measure_times
-from edgel._demo.tables import REACH, count_table, findings, normals_table, offset_table, time_table, truth_table
+from edgel._demo.tables import (
+    PUBLISHED,
+    REACH,
+    count_table,
+    findings,
+    normals_table,
+    offset_table,
+    time_table,
+    truth_table,
+)
 from edgel._demo.truth import found_lengths, offsets
 from edgel._detect import detect
 from edgel._report import Case, Table, make_directory, write_report
+from edgel.cloud import Cloud
 from edgel.io import write
+from edgel.synth import Solid
 
 __all__ = ["Demo", "Measurement", "Times", "run_demo", "side_by_side"]
+
+_DRAWN = 0.2  # mm between the points of a part's surface in the report's first figure
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,17 +92,26 @@ def run_demo(
     folder = make_directory(directory)
     tell = progress or (lambda _: None)
     tell("scanning")
-    scans = [synth.scan(part, num_points=num_points) for part in (synth.tee(), synth.elbow())]
+    solids = (synth.tee(), synth.elbow())
+    scans = [synth.scan(solid, num_points=num_points or PUBLISHED[solid.name].points) for solid in solids]
+    clouds = [scan.cloud for scan in scans]
     tell("finding edges")
-    paper.detect(scans[0].cloud, num_neighbors=NUM_NEIGHBORS)  # so that the report's times hold no compilation
-    found = [paper.detect(scan.cloud, num_neighbors=NUM_NEIGHBORS) for scan in scans]
-    times = measure_times(scans, found, repeats, tell)
-    tell("comparing with the default preset")
-    others = [detect(scan.cloud) for scan in scans]
+    paper.detect(clouds[0], num_neighbors=NUM_NEIGHBORS)  # so that the report's times hold no compilation
+    found = [paper.detect(cloud, num_neighbors=NUM_NEIGHBORS) for cloud in clouds]
+    times = measure_times(clouds, found, repeats, tell)
+    tell("comparing with the default method")
+    others = [detect(cloud) for cloud in clouds]
     tell("comparing with the truth")
     measurements = tuple(
-        Measurement(scan, edges, spent, found_lengths(scan, edges, reach=REACH), offsets(scan, edges))
-        for scan, edges, spent in zip(scans, found, times, strict=True)
+        Measurement(
+            solid,
+            scan,
+            edges,
+            spent,
+            found_lengths(solid, scan.cloud, edges, reach=REACH),
+            offsets(solid, scan.cloud, edges),
+        )
+        for solid, scan, edges, spent in zip(solids, scans, found, times, strict=True)
     )
     tables = tuple(make(measurements) for make in (count_table, normals_table, time_table, truth_table, offset_table))
     said = tuple(sentence for one in measurements for sentence in findings(one))
@@ -98,7 +120,7 @@ def run_demo(
     tell("drawing")
     plot.save(folder / "edges.png", side_by_side(measurements))
     cases = [
-        Case(one.name, one.scan.cloud, one.edges, one.scan.part, other=other)
+        Case(one.name, one.scan.cloud, one.edges, _surface(one.solid), other=other)
         for one, other in zip(measurements, others, strict=True)
     ]
     page = write_report(cases, folder, title="Edges of a tee and an elbow", findings=said, tables=tables)
@@ -109,7 +131,7 @@ def run_demo(
 def side_by_side(measurements: Sequence[Measurement], *, width: int = 1600) -> np.ndarray:
     """Draw figure 4 of all parts in one picture at one scale, (H, width, 3) uint8."""
     gap, rim = width // 40, 4
-    extents = [np.ptp(one.scan.part.bounds, axis=0) for one in measurements]
+    extents = [np.ptp(one.solid.vertices[:, :2], axis=0) for one in measurements]
     free = width - gap * (len(extents) - 1) - 2 * rim * len(extents)
     scale = free / sum(extent[0] for extent in extents)
     height = int(np.ceil(max(extent[1] for extent in extents) * scale)) + 2 * rim
@@ -122,6 +144,13 @@ def side_by_side(measurements: Sequence[Measurement], *, width: int = 1600) -> n
         canvas[:, left : left + size[0]] = picture
         left += size[0] + gap
     return canvas
+
+
+def _surface(solid: Solid) -> Cloud:
+    """Points on the surface of a part, close enough to be drawn as one."""
+    scene = synth.sample(solid, spacing=_DRAWN)
+    nx, ny, nz = scene.normals.T
+    return scene.cloud.with_attributes(nx=nx, ny=ny, nz=nz)
 
 
 def _write_clouds(folder: Path, one: Measurement) -> list[Path]:

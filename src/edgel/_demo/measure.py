@@ -10,10 +10,12 @@ from typing import Any
 
 from edgel import paper
 from edgel._demo.truth import FoundLength, Offsets
+from edgel._neighbors.candidates import anywhere, every_point
 from edgel._neighbors.kdtree import build_index
-from edgel._neighbors.normals import estimate_normals, fit_planes, plane_fits
+from edgel._neighbors.normals import estimate_normals, fit_planes
+from edgel.cloud import Cloud
 from edgel.paper import PaperEdges
-from edgel.synth import Scan
+from edgel.synth import Scene, Solid
 
 NUM_NEIGHBORS = 16
 
@@ -62,7 +64,8 @@ class Times:
 class Measurement:
     """Everything measured on one part: its scan, the edges, the times, and how they compare with the truth."""
 
-    scan: Scan
+    solid: Solid
+    scan: Scene
     edges: PaperEdges
     times: Times
     found: tuple[FoundLength, ...]
@@ -71,34 +74,34 @@ class Measurement:
     @property
     def name(self) -> str:
         """Name of the part."""
-        return self.scan.part.name
+        return self.solid.name
 
 
 def measure_times(
-    scans: Sequence[Scan], found: Sequence[PaperEdges], repeats: int, tell: Callable[[str], None]
+    clouds: Sequence[Cloud], found: Sequence[PaperEdges], repeats: int, tell: Callable[[str], None]
 ) -> list[Times]:
     """Time every part in turn, round by round, so that what else the machine does falls on all alike."""
-    rounds: list[list[Times]] = [[] for _ in scans]
+    rounds: list[list[Times]] = [[] for _ in clouds]
     for number in range(repeats + 1):
         tell("warming up" if number == 0 else f"measuring, round {number} of {repeats}")
-        for measured, scan, edges in zip(rounds, scans, found, strict=True):
-            once = _measure_once(scan, edges)
+        for measured, cloud, edges in zip(rounds, clouds, found, strict=True):
+            once = _measure_once(cloud, edges)
             if number > 0:
                 measured.append(once)
     names = [one.name for one in fields(Times)]
     return [Times(**{name: statistics.median(getattr(one, name) for one in each) for name in names}) for each in rounds]
 
 
-def _measure_once(scan: Scan, edges: PaperEdges) -> Times:
-    xyz, rows = scan.cloud.xyz, edges.index
-    stages = paper.detect(scan.cloud, num_neighbors=NUM_NEIGHBORS).seconds
+def _measure_once(cloud: Cloud, edges: PaperEdges) -> Times:
+    xyz, rows = cloud.xyz, edges.index
+    stages = paper.detect(cloud, num_neighbors=NUM_NEIGHBORS).seconds
     index = build_index(xyz)
     return Times(
-        all_normals=_seconds(lambda: estimate_normals(scan.cloud, num_neighbors=NUM_NEIGHBORS)),
+        all_normals=_seconds(lambda: estimate_normals(cloud, num_neighbors=NUM_NEIGHBORS)),
         edge_normals=stages["normals"],
         index=_seconds(lambda: build_index(xyz)),
-        all_fits=_seconds(lambda: fit_planes(index, index, NUM_NEIGHBORS)),
-        edge_fits=_seconds(lambda: plane_fits(index, xyz[rows], NUM_NEIGHBORS)),
+        all_fits=_seconds(lambda: fit_planes(index, every_point(index), NUM_NEIGHBORS)),
+        edge_fits=_seconds(lambda: fit_planes(index, anywhere(xyz[rows]), NUM_NEIGHBORS)),
         image=sum(stages[name] for name in ("projection", "canny", "back-projection")),
     )
 

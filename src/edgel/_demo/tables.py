@@ -84,7 +84,7 @@ def truth_table(measurements: Sequence[Measurement]) -> Table:
     rows = [
         {
             "part": one.name,
-            "true edge": found.kind,
+            "true edge": found.name,
             "length (mm)": found.length,
             "with an edge pixel": found.with_pixel,
             "with an edge point": found.with_point,
@@ -94,8 +94,8 @@ def truth_table(measurements: Sequence[Measurement]) -> Table:
     ]
     formats = {"length (mm)": ".0f", "with an edge pixel": ".1%", "with an edge point": ".1%"}
     note = (
-        f"Share of the true length with an edge pixel's centre or an edge point within {REACH:g} mm in x, y. Boundary: "
-        "the rims; occluding: the outline, where the surface turns away from the viewer; crease: the seam."
+        f"Share of the true length with an edge pixel's centre or an edge point within {REACH:g} mm in x, y. Rim: an "
+        "open end; outline: where the part turns away from the viewer; seam: where two pipes meet."
     )
     return Table("True edges found", rows, formats, note)
 
@@ -150,15 +150,14 @@ def _time_by_points(one: Measurement) -> tuple[tuple[float, int], tuple[float, i
 
 
 def _truth_findings(one: Measurement) -> list[str]:
-    names = {"boundary": "rims", "occluding": "occluding outline", "crease": "seam"}
-    shares = ", ".join(f"{found.with_pixel:.1%} of the {names[found.kind]}" for found in one.found)
+    shares = ", ".join(f"{found.with_pixel:.1%} of the {found.name}" for found in one.found)
     said = f"{one.name}: edge pixels lie within {REACH:g} mm of {shares}."
-    if any(found.kind == "crease" and found.with_pixel < 0.5 for found in one.found):
+    if any(found.name == "seam" and found.with_pixel < 0.5 for found in one.found):
         said += (
             " The seam is missed but for its ends: height and steepness are equal on its two sides, only the direction "
             "of the slope turns, and Canny looks for the steepest places."
         )
-    if any(found.kind == "boundary" and found.with_pixel < 0.95 for found in one.found):
+    if any(found.name == "rim" and found.with_pixel < 0.95 for found in one.found):
         said += (
             " Rims have gaps: they lie on the border of the image, and where the gradient is largest one pixel beyond "
             "it no edge pixel is left."

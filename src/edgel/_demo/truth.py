@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import knn
+from edgel.cloud import Cloud
 from edgel.paper import PaperEdges
-from edgel.synth import EDGE_KINDS, Part, Scan
+from edgel.synth import EdgeCurve, Solid, nearest_edge
+
+_FLAT = np.array([1.0, 1.0, 0.0])  # as the viewer above sees it, in x and y alone
 
 
 @dataclass(frozen=True)
 class FoundLength:
-    """How much of the true edges of one kind was found.
+    """How much of the true edges of one name was found.
 
     Attributes
     ----------
-    kind : str
-        ``"boundary"``, ``"occluding"`` or ``"crease"``.
+    name : str
+        ``"rim"``, ``"outline"`` or ``"seam"``.
     length : float
         Their length in 3D, mm.
     with_pixel : float
@@ -28,7 +32,7 @@ class FoundLength:
         Share of it with an edge point near it in x, y.
     """
 
-    kind: str
+    name: str
     length: float
     with_pixel: float
     with_point: float
@@ -44,54 +48,55 @@ class Offsets:
     largest: float
 
 
-def found_lengths(scan: Scan, edges: PaperEdges, *, reach: float = 1.0) -> tuple[FoundLength, ...]:
-    """Measure how much of the true edges was found, by kind.
+def found_lengths(solid: Solid, cloud: Cloud, edges: PaperEdges, *, reach: float = 1.0) -> tuple[FoundLength, ...]:
+    """Measure how much of the true edges was found, by their names.
 
     Parameters
     ----------
-    scan : Scan
+    solid : Solid
+    cloud : Cloud
+        A scan of it from above.
     edges : PaperEdges
-        Of the scan's cloud.
+        Of the cloud.
     reach : float
         How near in x, y an edge pixel or point has to be, mm.
 
     Examples
     --------
     >>> from edgel import paper, synth
-    >>> scan = synth.scan(synth.elbow(), num_points=50_000)
-    >>> found = found_lengths(scan, paper.detect(scan.cloud), reach=4.0)
-    >>> [(one.kind, one.with_point > 0.9) for one in found]
-    [('boundary', True), ('occluding', True)]
+    >>> solid = synth.elbow()
+    >>> cloud = synth.scan(solid, num_points=50_000).cloud
+    >>> found = found_lengths(solid, cloud, paper.detect(cloud), reach=4.0)
+    >>> [(one.name, one.with_point > 0.9) for one in found]
+    [('rim', True), ('outline', True)]
     """
-    flat = np.array([1.0, 1.0, 0.0])
     rows, columns = np.nonzero(edges.edge_map)
     pixels = np.column_stack([edges.grid.centres(rows, columns), np.zeros(len(rows))])
-    points = scan.cloud.xyz[edges.index] * flat
+    points = cloud.xyz[edges.index] * _FLAT
     found = []
-    for kind in EDGE_KINDS:
-        middles, lengths = _segments(scan.part, kind)
-        if len(lengths):
-            total = lengths.sum()
-            shares = [lengths[_is_near(middles * flat, those, reach)].sum() / total for those in (pixels, points)]
-            found.append(FoundLength(kind, float(total), float(shares[0]), float(shares[1])))
+    for name in dict.fromkeys(curve.name for curve in (*solid.boundaries, *solid.creases)):
+        middles, lengths = _segments([curve for curve in solid.edges if curve.name == name])
+        total = lengths.sum()
+        shares = [lengths[_is_near(middles * _FLAT, those, reach)].sum() / total for those in (pixels, points)]
+        found.append(FoundLength(name, float(total), float(shares[0]), float(shares[1])))
     return tuple(found)
 
 
-def offsets(scan: Scan, edges: PaperEdges) -> Offsets:
+def offsets(solid: Solid, cloud: Cloud, edges: PaperEdges) -> Offsets:
     """Measure how far the edge points lie from the nearest true edge as the viewer sees it; NaN if there are none."""
-    distance = scan.nearest_seen.distance[edges.index]
-    if len(distance) == 0:
+    if len(edges) == 0:
         return Offsets(np.nan, np.nan, np.nan)
+    flat = [replace(curve, points=curve.points * _FLAT) for curve in solid.edges]
+    distance = nearest_edge(cloud.xyz[edges.index] * _FLAT, flat).distance
     median, most, largest = np.percentile(distance, [50, 95, 100])
     return Offsets(float(median), float(most), float(largest))
 
 
-def _segments(part: Part, kind: str) -> tuple[np.ndarray, np.ndarray]:
-    """Middles (S, 3) and lengths (S,) of the pieces of all edges of a kind."""
-    curves = [edge.points for edge in part.edges if edge.kind == kind]
-    middles = [(points[:-1] + points[1:]) / 2 for points in curves]
-    lengths = [np.linalg.norm(np.diff(points, axis=0), axis=1) for points in curves]
-    return np.concatenate([np.empty((0, 3)), *middles]), np.concatenate([np.empty(0), *lengths])
+def _segments(curves: Sequence[EdgeCurve]) -> tuple[np.ndarray, np.ndarray]:
+    """Middles (S, 3) and lengths (S,) of the pieces of curves."""
+    middles = [(curve.points[:-1] + curve.points[1:]) / 2 for curve in curves]
+    lengths = [np.linalg.norm(np.diff(curve.points, axis=0), axis=1) for curve in curves]
+    return np.concatenate(middles), np.concatenate(lengths)
 
 
 def _is_near(queries: np.ndarray, points: np.ndarray, reach: float) -> np.ndarray:

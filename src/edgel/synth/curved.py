@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from edgel.synth.solid import Solid, flat_normals, grid_triangles, make_solid
+from edgel.synth.solid import Solid, flat_normals, from_patches, grid_triangles, make_solid, unit
 
 _CHORD = 0.003  # of the usual spacing, along each of the two directions of a patch
 
@@ -14,29 +14,29 @@ _CHORD = 0.003  # of the usual spacing, along each of the two directions of a pa
 def sphere(*, radius: float = 25.0) -> Solid:
     """Make a sphere: no edge at all."""
     spacing = radius / 50
-    count = _steps(radius, 2 * np.pi, spacing)
+    count = arc_steps(radius, 2 * np.pi, spacing)
     u, v = np.meshgrid(np.linspace(0, 2 * np.pi, 2 * (count // 2) + 1), np.linspace(-np.pi / 2, np.pi / 2, count // 2))
     normals = np.stack([np.cos(v) * np.cos(u), np.cos(v) * np.sin(u), np.sin(v)], axis=-1).swapaxes(0, 1)
-    return _patches("sphere", [(radius * normals, normals)], spacing=spacing)
+    return from_patches("sphere", [(radius * normals, normals)], spacing=spacing)
 
 
 def torus(*, radius: float = 30.0, tube: float = 12.0) -> Solid:
     """Make a torus about the z axis: no edge at all."""
     spacing = tube / 20
     u, v = np.meshgrid(
-        np.linspace(0, 2 * np.pi, _steps(radius + tube, 2 * np.pi, spacing) + 1),
-        np.linspace(0, 2 * np.pi, _steps(tube, 2 * np.pi, spacing) + 1),
+        np.linspace(0, 2 * np.pi, arc_steps(radius + tube, 2 * np.pi, spacing) + 1),
+        np.linspace(0, 2 * np.pi, arc_steps(tube, 2 * np.pi, spacing) + 1),
         indexing="ij",
     )
     normals = np.stack([np.cos(v) * np.cos(u), np.cos(v) * np.sin(u), np.sin(v)], axis=-1)
     ring = np.stack([np.cos(u), np.sin(u), np.zeros_like(u)], axis=-1)
-    return _patches("torus", [(radius * ring + tube * normals, normals)], spacing=spacing)
+    return from_patches("torus", [(radius * ring + tube * normals, normals)], spacing=spacing)
 
 
 def plane(*, side: float = 120.0) -> Solid:
     """Make a square in z = 0: no crease, one boundary."""
     flat = side * np.array([[[0, 0, 0], [0, 1, 0]], [[1, 0, 0], [1, 1, 0]]], float)
-    return _patches("plane", [(flat, np.broadcast_to([0.0, 0.0, 1.0], flat.shape))], spacing=side / 170)
+    return from_patches("plane", [(flat, np.broadcast_to([0.0, 0.0, 1.0], flat.shape))], spacing=side / 170)
 
 
 def wavy_sheet(*, side: float = 120.0, amplitude: float = 4.0) -> Solid:
@@ -46,8 +46,8 @@ def wavy_sheet(*, side: float = 120.0, amplitude: float = 4.0) -> Solid:
     z = amplitude * np.sin(k * x) * np.cos(m * y)
     slope_x = amplitude * k * np.cos(k * x) * np.cos(m * y)
     slope_y = -amplitude * m * np.sin(k * x) * np.sin(m * y)
-    normals = _unit(np.stack([-slope_x, -slope_y, np.ones_like(z)], axis=-1))
-    return _patches("wavy_sheet", [(np.stack([x, y, z], axis=-1), normals)], spacing=side / 170)
+    normals = unit(np.stack([-slope_x, -slope_y, np.ones_like(z)], axis=-1))
+    return from_patches("wavy_sheet", [(np.stack([x, y, z], axis=-1), normals)], spacing=side / 170)
 
 
 def bezier_ridge(*, side: float = 120.0) -> Solid:
@@ -67,7 +67,7 @@ def bezier_ridge(*, side: float = 120.0) -> Solid:
             net[i] = np.stack([np.full(4, way * out * step), y, seam[:, 2] - drop * fall], axis=-1)
         net[1, :, 0] += seam[:, 0]
         nets.append(net[::way])  # x ascends along the first axis of both, so that normals point up
-    return _patches("bezier_ridge", [_bezier(net, 161) for net in nets], spacing=side / 170)
+    return from_patches("bezier_ridge", [_bezier(net, 161) for net in nets], spacing=side / 170)
 
 
 def gear(*, teeth: int = 16, root: float = 32.0, tip: float = 40.0, bore: float = 10.0, thick: float = 15.0) -> Solid:
@@ -78,7 +78,7 @@ def gear(*, teeth: int = 16, root: float = 32.0, tip: float = 40.0, bore: float 
     for tooth in range(teeth):
         for k, (start, stop, r0, r1) in enumerate(arcs):
             round_part = r0 == r1
-            steps = max(2, _steps(r0, (stop - start) * period, spacing)) if round_part else 1
+            steps = max(2, arc_steps(r0, (stop - start) * period, spacing)) if round_part else 1
             angle = (tooth + np.linspace(start, stop, steps + 1)) * period
             ring = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
             outer = np.linspace(r0, r1, steps + 1)[:, None] * ring
@@ -103,7 +103,7 @@ def gear(*, teeth: int = 16, root: float = 32.0, tip: float = 40.0, bore: float 
 def cylinder(*, radius: float = 20.0, height: float = 50.0) -> Solid:
     """Make a solid cylinder on z = 0 about the z axis: two round creases."""
     spacing = 0.6
-    angle = np.linspace(0, 2 * np.pi, _steps(radius, 2 * np.pi, spacing) + 1)
+    angle = np.linspace(0, 2 * np.pi, arc_steps(radius, 2 * np.pi, spacing) + 1)
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     wall = _upright(radius * ring, height)
     parts = [(grid_triangles(wall), grid_triangles(_upright(ring, 0.0)))]
@@ -132,8 +132,8 @@ def lathe(
         See `Solid.spacing`.
     """
     corners = np.asarray(profile, np.float64)
-    pieces = _rounded(corners, fillets, closed=corners[0, 0] > 0, spacing=spacing)
-    angle = np.linspace(0, 2 * np.pi, _steps(corners[:, 0].max(), 2 * np.pi, spacing) + 1)
+    pieces = round_corners(corners, fillets, closed=corners[0, 0] > 0, spacing=spacing)
+    angle = np.linspace(0, 2 * np.pi, arc_steps(corners[:, 0].max(), 2 * np.pi, spacing) + 1)
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     ring[-1] = ring[0]  # to the last bit, or the seam would be a boundary
 
@@ -141,7 +141,7 @@ def lathe(
         around = line[None, :, :1] * ring[:, None]
         return np.concatenate([around, np.broadcast_to(line[None, :, 1:], (*around.shape[:2], 1))], axis=2)
 
-    return _patches("lathe", [(turned(points), turned(normals)) for points, normals in pieces], spacing=spacing)
+    return from_patches("lathe", [(turned(points), turned(normals)) for points, normals in pieces], spacing=spacing)
 
 
 def prism(
@@ -152,7 +152,7 @@ def prism(
     spacing: float = 0.8,
 ) -> Solid:
     """Raise a convex polygon, counterclockwise, from z = 0 to `height`, mm; upright edges may have fillets."""
-    pieces = _rounded(np.asarray(corners, np.float64), fillets, closed=True, spacing=spacing)
+    pieces = round_corners(np.asarray(corners, np.float64), fillets, closed=True, spacing=spacing)
     parts = []
     for points, normals in pieces:
         wall, out = _upright(points, height), _upright(normals, 0.0)
@@ -168,16 +168,37 @@ def prism(
     return make_solid("prism", triangles, face, normals, spacing=spacing)
 
 
-def _rounded(
-    corners: np.ndarray, fillets: Sequence[float] | None, *, closed: bool, spacing: float
+def round_corners(
+    corners: np.ndarray, fillets: Sequence[float] | np.ndarray | None, *, closed: bool, spacing: float
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Sides and fillets of a plane polyline (C, 2), the inside on its left: points and outer normals (P, 2) of each."""
+    """Round the corners of a plane polyline.
+
+    Parameters
+    ----------
+    corners : (C, 2) float64
+        In order with the inside on their left, mm; of a closed one the first is not repeated.
+    fillets : (C,) float, optional
+        Radius, mm, at each corner; 0 is sharp.
+    closed : bool
+    spacing : float
+        See `Solid.spacing`.
+
+    Returns
+    -------
+    list of (points, normals)
+        Sides and fillets in order, points (P, 2) and outer unit normals (P, 2) of each.
+
+    Raises
+    ------
+    ValueError
+        If there is not one fillet for each corner, or they leave nothing of a side.
+    """
     count = len(corners)
     radii = np.zeros(count) if fillets is None else np.asarray(fillets, np.float64)
     if radii.shape != (count,):
         raise ValueError(f"fillets: expected one for each of {count} corners, got {radii.shape}")
     before, after = np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0)
-    arrive, leave = _unit(corners - before), _unit(after - corners)
+    arrive, leave = unit(corners - before), unit(after - corners)
     turn = np.arctan2(arrive[:, 0] * leave[:, 1] - arrive[:, 1] * leave[:, 0], (arrive * leave).sum(axis=1))
     if not closed:
         radii = np.where((np.arange(count) == 0) | (np.arange(count) == count - 1), 0, radii)
@@ -190,21 +211,13 @@ def _rounded(
         if radii[i] > 0:
             out = np.array([arrive[i, 1], -arrive[i, 0]])
             centre = corners[i] - trim[i] * arrive[i] - np.sign(turn[i]) * radii[i] * out
-            swing = np.linspace(0, turn[i], max(4, _steps(radii[i], abs(turn[i]), spacing)) + 1)[:, None]
+            swing = np.linspace(0, turn[i], max(4, arc_steps(radii[i], abs(turn[i]), spacing)) + 1)[:, None]
             normals = np.cos(swing) * out + np.sin(swing) * np.array([-out[1], out[0]])
             points = centre + np.sign(turn[i]) * radii[i] * normals
             points[0], points[-1] = corners[i] - trim[i] * arrive[i], starts[i]
             pieces.append((points, normals))
         pieces.append((np.stack([starts[i], stops[i]]), np.tile([leave[i, 1], -leave[i, 0]], (2, 1))))
     return pieces
-
-
-def _patches(name: str, patches: Sequence[tuple[np.ndarray, np.ndarray]], *, spacing: float) -> Solid:
-    """Join grids of points and unit normals, each (M, N, 3): every grid is one face."""
-    corners = [grid_triangles(points) for points, _ in patches]
-    normals = [grid_triangles(normal) for _, normal in patches]
-    face = np.repeat(np.arange(len(patches)), [len(part) for part in corners])
-    return make_solid(name, np.concatenate(corners), face, np.concatenate(normals), spacing=spacing)
 
 
 def _bezier(net: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -217,7 +230,7 @@ def _bezier(net: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     points = np.einsum("ui,vj,ijk->uvk", basis, basis, net)
     along_u = np.einsum("ui,vj,ijk->uvk", quadratic(t), basis, np.diff(net, axis=0))
     along_v = np.einsum("ui,vj,ijk->uvk", basis, quadratic(t), np.diff(net, axis=1))
-    return points, _unit(np.cross(along_u, along_v))
+    return points, unit(np.cross(along_u, along_v))
 
 
 def _upright(ring: np.ndarray, height: float) -> np.ndarray:
@@ -226,10 +239,6 @@ def _upright(ring: np.ndarray, height: float) -> np.ndarray:
     return np.stack([low, low + (0, 0, height)], axis=1)
 
 
-def _steps(radius: float, angle: float, spacing: float) -> int:
+def arc_steps(radius: float, angle: float, spacing: float) -> int:
     """Count the chords that stay near enough to an arc: the sagitta of a chord over the angle a is r a^2 / 8."""
     return int(np.ceil(angle / np.sqrt(8 * _CHORD * spacing / radius)))
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)

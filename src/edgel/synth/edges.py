@@ -11,8 +11,8 @@ import numpy as np
 from edgel._kernels.parallel import kernel, run_slices
 from edgel.cloud import as_cloud
 
-EDGE_KINDS = ("boundary", "occluding", "crease")
-_CHORD = 0.05  # mm; on a radius of 57 mm the polyline is then within 6e-6 mm of the curve
+EDGE_KINDS = ("boundary", "crease")
+_CHORD = 0.05  # mm, of `line` and `arc`; on a radius of 57 mm the polyline is then within 6e-6 mm of the curve
 _LEAF = 8  # segments in a leaf of the search tree
 
 
@@ -23,18 +23,19 @@ class EdgeCurve:
     Attributes
     ----------
     kind : str
-        ``"boundary"``: the surface ends (a rim); ``"occluding"``: it turns away from the viewer (a silhouette);
-        ``"crease"``: two faces meet.
+        ``"boundary"``: the surface ends; ``"crease"``: two faces meet.
     points : (P, 3) float64
-        Points on the edge, in order along it, at most 0.05 mm apart; mm.
+        Points on the edge, in order along it, mm: the true edge runs straight from one to the next, or nearly so.
     normals : (P, 2, 3) float64 or None
-        Unit normals of the two faces that meet in a crease; None for the other kinds.
+        Unit normals of the two faces that meet in a crease; None for a boundary.
+    name : str
+        What the edge is called on this part, ``"rim"``; empty where there is nothing to tell apart.
 
     Examples
     --------
     >>> import numpy as np
     >>> from edgel import synth
-    >>> seam = [edge for edge in synth.tee().edges if edge.kind == "crease"][0]
+    >>> seam = synth.tee().creases[0]
     >>> [round(float(degrees), 3) for degrees in np.degrees(seam.dihedral[[0, -1]])]  # fades at the top
     [0.0, 90.0]
     """
@@ -42,6 +43,7 @@ class EdgeCurve:
     kind: str
     points: np.ndarray
     normals: np.ndarray | None = None
+    name: str = ""
 
     def __post_init__(self) -> None:
         if self.kind not in EDGE_KINDS:
@@ -49,7 +51,7 @@ class EdgeCurve:
         if self.points.ndim != 2 or self.points.shape[1] != 3 or len(self.points) < 2:
             raise ValueError(f"points: expected (P, 3) with P of 2 or more, got {self.points.shape}")
         if (self.kind == "crease") != (self.normals is not None):
-            raise ValueError(f"normals: a crease has them and no other kind does, got kind {self.kind!r}")
+            raise ValueError(f"normals: a crease has them and a boundary does not, got kind {self.kind!r}")
         if self.normals is not None and self.normals.shape != (len(self.points), 2, 3):
             raise ValueError(f"normals: expected {(len(self.points), 2, 3)}, got {self.normals.shape}")
 
@@ -136,10 +138,10 @@ def nearest_edge(points: object, curves: Sequence[EdgeCurve]) -> NearestEdge:
     Examples
     --------
     >>> from edgel import synth
-    >>> part = synth.tee()
-    >>> found = synth.nearest_edge([[0.0, -60.0, 0.0]], part.edges)
-    >>> part.edges[found.curve[0]].kind, round(float(found.distance[0]), 6)
-    ('occluding', 2.85)
+    >>> edges = synth.tee().edges
+    >>> found = synth.nearest_edge([[0.0, -60.0, 0.0]], edges)
+    >>> edges[found.curve[0]].name, round(float(found.distance[0]), 6)
+    ('outline', 2.85)
     """
     if not curves:
         raise ValueError("curves: expected at least one edge, got none")
@@ -205,7 +207,7 @@ def _nearest_segments(start, stop, xyz, begin, end, tree, segment, fraction):
     guess = 0
     for p in range(start, stop):
         x, y, z = xyz[p, 0], xyz[p, 1], xyz[p, 2]
-        # The scan goes row by row: the edge of the point before bounds the search for this one.
+        # Scans go row by row: the edge of the point before bounds the search for this one.
         best, where = _foot(begin, end, guess, x, y, z)
         stack[0] = 1
         top = 1

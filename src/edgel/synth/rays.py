@@ -53,6 +53,11 @@ class RayTree:
     corners: np.ndarray
     boxes: np.ndarray
 
+    @property
+    def bounds(self) -> np.ndarray:
+        """Least and greatest x, y, z of all triangles, (2, 3), mm."""
+        return self.boxes[1].reshape(2, 3)
+
 
 def build_ray_tree(solid: Solid) -> RayTree:
     """Sort the triangles of a solid for `cast`."""

@@ -67,7 +67,7 @@ def sample(
     triangle, weights = _PATTERNS[pattern](solid, spacing, rng)
     places = np.einsum("ij,ijk->ik", weights, solid.corners[triangle])
     normals = surface_normals(solid, triangle, weights)
-    edges = sample_curves([*solid.creases, *solid.boundaries], STEP * spacing)
+    edges = sample_curves(solid.edges, STEP * spacing)
     crease = edges.take((edges.kind == EdgeKind.CREASE) & (np.nan_to_num(edges.dihedral) >= CREASE_TURN))
     boundary = edges.take(edges.kind == EdgeKind.BOUNDARY)
     kind = np.zeros(len(places), np.uint8)
@@ -105,15 +105,18 @@ def _scatter(solid: Solid, count: int, rng: np.random.Generator) -> tuple[np.nda
 
 
 def _blue_noise(solid: Solid, spacing: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Throw darts; keep those that land farther than a disc from all kept before (Cook 1986, doi:10.1145/7529.8927)."""
+    """Throw darts; keep those that land farther than a disc from all kept before."""
     triangle, weights = _scatter(solid, round(_TRIES * solid.area / spacing**2), rng)
     places = np.einsum("ij,ijk->ik", weights, solid.corners[triangle])
-    keep = _keep_apart(places, _DISC * spacing)
+    keep = poisson_disc(places, _DISC * spacing)
     return triangle[keep], weights[keep]
 
 
-def _keep_apart(places: np.ndarray, radius: float) -> np.ndarray:
-    """Tell which places (N, 3), taken in turn, are no nearer than the radius to any kept before; (N,) bool."""
+def poisson_disc(places: np.ndarray, radius: float) -> np.ndarray:
+    """Tell which places (N, 3), taken in turn, are no nearer than the radius to any kept before; (N,) bool.
+
+    Cook 1986, doi:10.1145/7529.8927.
+    """
     cells = np.floor((places - places.min(axis=0)) / radius).astype(np.int64) + 1
     keep = np.zeros(len(places), bool)
     _throw(places, cells, cells.max(axis=0) + 2, radius, keep)
@@ -122,14 +125,13 @@ def _keep_apart(places: np.ndarray, radius: float) -> np.ndarray:
 
 def _vertices(solid: Solid, spacing: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """A Poisson disc whose first darts are set along the creases and boundaries."""
-    curves = [*solid.creases, *solid.boundaries]
-    on_edges = sample_curves(curves, spacing).positions if curves else np.empty((0, 3))
+    on_edges = sample_curves(solid.edges, spacing).positions
     triangle, weights = _scatter(solid, round(_TRIES * solid.area / spacing**2), rng)
     places = np.einsum("ij,ijk->ik", weights, solid.corners[triangle])
     edge_triangle, edge_weights = _on_surface(solid, on_edges)
     triangle, weights = np.concatenate([edge_triangle, triangle]), np.concatenate([edge_weights, weights])
     places = np.concatenate([on_edges, places])
-    keep = _keep_apart(places, _DISC * spacing)
+    keep = poisson_disc(places, _DISC * spacing)
     return triangle[keep], weights[keep]
 
 

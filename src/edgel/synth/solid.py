@@ -17,7 +17,7 @@ _WELD = 1e-6  # mm; corners of patches nearer than this are one vertex
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A surface with known faces and edges; made by the functions of `edgel.synth.shapes` and its siblings.
+    """A surface with known faces and edges; made by the functions of `edgel.synth`.
 
     Attributes
     ----------
@@ -47,6 +47,11 @@ class Solid:
     creases: tuple[EdgeCurve, ...]
     boundaries: tuple[EdgeCurve, ...]
     spacing: float
+
+    @property
+    def edges(self) -> tuple[EdgeCurve, ...]:
+        """Creases, then boundaries."""
+        return (*self.creases, *self.boundaries)
 
     @property
     def corners(self) -> np.ndarray:
@@ -113,6 +118,17 @@ def from_polygons(
     return make_solid(name, corners, face, flat_normals(corners), spacing=spacing)
 
 
+def from_patches(name: str, patches: Sequence[tuple[np.ndarray, np.ndarray]], *, spacing: float) -> Solid:
+    """Join patches to a solid: each a grid of points and one of their unit normals, both (M, N, 3), is one face.
+
+    The first axis of a grid, then the second, then outwards is right-handed. Neighbours must share whole edges.
+    """
+    corners = [grid_triangles(points) for points, _ in patches]
+    normals = [grid_triangles(normal) for _, normal in patches]
+    face = np.repeat(np.arange(len(patches)), [len(part) for part in corners])
+    return make_solid(name, np.concatenate(corners), face, np.concatenate(normals), spacing=spacing)
+
+
 def flat_normals(corners: np.ndarray) -> np.ndarray:
     """Unit normals of plane triangles (T, 3, 3), repeated for each corner, (T, 3, 3)."""
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -125,6 +141,11 @@ def grid_triangles(values: np.ndarray) -> np.ndarray:
     a, b, c, d = values[:-1, :-1], values[1:, :-1], values[1:, 1:], values[:-1, 1:]
     pairs = np.stack([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)], axis=2)
     return pairs.reshape(-1, 3, *values.shape[2:])
+
+
+def unit(vectors: np.ndarray) -> np.ndarray:
+    """Scale vectors (..., 3) to length 1."""
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
 def is_convex(normals: np.ndarray, tangents: np.ndarray) -> np.ndarray:

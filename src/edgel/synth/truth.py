@@ -12,7 +12,7 @@ from edgel._neighbors.knn import knn
 from edgel.cloud import Cloud
 from edgel.edges import EdgeKind
 from edgel.synth.edges import EdgeCurve
-from edgel.synth.solid import is_convex
+from edgel.synth.solid import is_convex, unit
 
 STEP = 0.25
 """True curves are sampled at most this many spacings apart."""
@@ -60,17 +60,17 @@ class TrueEdges:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A cloud and the truth about it; made by `view` and `sample`.
+    """A cloud and the truth about it; made by `view`, `scan` and `sample`.
 
     Attributes
     ----------
     name : str
     cloud : Cloud
         With noise and outliers. A view's is organized, in the frame of the sensor (x right, y down, z forward), NaN
-        where the ray met nothing, the viewpoint at the origin; a sample's is unorganized, in the frame of the solid.
+        where the ray met nothing, the viewpoint at the origin; others are unorganized, in the frame of the solid.
     spacing : float
         Root of the area a point stands for, mm: of the surface's area over the number of points, of a view the area it
-        sees. The nominal value, asked for; what came out is within a few percent of it.
+        sees, of a scan that seen from above. The nominal value; what came out is within a few percent of it.
     edges : TrueEdges
         A crease is among them wherever it turns by more than `edgel.synth.solid.MIN_TURN`; in a view, where it is seen.
     point_kind : (N,) uint8
@@ -128,17 +128,20 @@ def point_edges(positions: np.ndarray, kind: EdgeKind, normals: np.ndarray) -> T
 def near_edges(points: np.ndarray, edges: TrueEdges, reach: float) -> np.ndarray:
     """Tell which points (N, 3) lie within `reach`, mm, of the curves that were sampled; (N,) bool."""
     near = np.zeros(len(points), bool)
-    if len(edges) == 0 or len(points) == 0:
+    if len(edges) == 0:
         return near
-    count = min(4, len(edges))
-    found = knn(build_index(np.ascontiguousarray(edges.positions)), np.ascontiguousarray(points), count)
+    low, high = edges.positions.min(axis=0) - 2 * reach, edges.positions.max(axis=0) + 2 * reach
+    inside = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
+    if len(inside) == 0:
+        return near
+    queries, count = np.ascontiguousarray(points[inside]), min(4, len(edges))
+    found = knn(build_index(np.ascontiguousarray(edges.positions)), queries, count)
     for column in range(count):  # where curves meet, the nearest sample may belong to the other one
-        rows = found.points[:, column]
-        offset = points - edges.positions[rows]
-        along = np.einsum("ij,ij->i", offset, edges.tangents[rows])
+        samples = found.points[:, column]
+        offset, tangents = queries - edges.positions[samples], edges.tangents[samples]
+        along = np.einsum("ij,ij->i", offset, tangents)
         along = np.clip(along, -reach / 4, reach / 4)  # as far as the samples' own stretch of the curve goes
-        across = np.linalg.norm(offset - along[:, None] * edges.tangents[rows], axis=1)
-        near |= across <= reach
+        near[inside] |= np.linalg.norm(offset - along[:, None] * tangents, axis=1) <= reach
     return near
 
 
@@ -150,16 +153,12 @@ def _sample_curve(curve: EdgeCurve, step: float) -> TrueEdges:
     left = np.clip(np.searchsorted(length, at, side="right") - 1, 0, len(length) - 2)
     part = ((at - length[left]) / (length[left + 1] - length[left]))[:, None]
     positions = (1 - part) * curve.points[left] + part * curve.points[left + 1]
-    tangents = _unit(curve.points[left + 1] - curve.points[left])
+    tangents = unit(curve.points[left + 1] - curve.points[left])
     if curve.normals is None:
         unknown = np.full((count, 2, 3), np.nan)
         flags, none = np.full(count, int(EdgeKind.BOUNDARY), np.uint8), np.zeros(count, np.int8)
         return TrueEdges(positions, flags, tangents, unknown, unknown[:, 0, 0].copy(), none)
-    normals = _unit((1 - part[..., None]) * curve.normals[left] + part[..., None] * curve.normals[left + 1])
+    normals = unit((1 - part[..., None]) * curve.normals[left] + part[..., None] * curve.normals[left + 1])
     turn = 2 * np.arcsin(np.minimum(np.linalg.norm(normals[:, 0] - normals[:, 1], axis=1) / 2, 1))
     convex = np.where(is_convex(normals, tangents), 1, -1).astype(np.int8)
     return TrueEdges(positions, np.full(count, int(EdgeKind.CREASE), np.uint8), tangents, normals, turn, convex)
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -98,7 +99,7 @@ def view(
     kind = grid_kinds(tree, rays, depth, normals.reshape(*shape, 3), spacing).ravel()
     normals = normals @ pose[:3, :3].T
     noise_free = _moved(rays.at(depth), pose)
-    seen = _seen_creases(solid, tree, pose, projection, spacing)
+    seen = _sensor_edges(solid, tree, pose, projection, spacing)
     rng = np.random.default_rng(seed)
     measured = np.where(hit, depth + noise * spacing * rng.standard_normal(shape), np.nan)
     outlier = np.zeros(shape, bool)
@@ -108,10 +109,7 @@ def view(
     margin = 0.1 * solid.size
     measured[outlier] = rng.uniform(near - margin, far + margin, np.count_nonzero(outlier))
     xyz = _moved(rays.at(measured), pose)
-    outline = [
-        point_edges(noise_free[(kind & flag) > 0], flag, normals[(kind & flag) > 0])
-        for flag in (EdgeKind.BOUNDARY, EdgeKind.OCCLUDING, EdgeKind.OCCLUDED)
-    ]
+    outline = outline_edges(noise_free, kind, normals)
     flat_hit, flat_out = hit.ravel(), outlier.ravel()
     strong = seen.take(seen.dihedral >= CREASE_TURN)
     kind[rows[near_edges(noise_free[rows], strong, CREASE_REACH * spacing)]] |= int(EdgeKind.CREASE)
@@ -119,7 +117,7 @@ def view(
         name=f"{solid.name}/{projection}/n{noise:g}/o{100 * outliers:g}",
         cloud=Cloud(xyz, shape=shape, viewpoint=np.zeros(3)),
         spacing=float(spacing),
-        edges=join([seen, *outline]),
+        edges=join([seen, outline]),
         point_kind=np.where(flat_hit & ~flat_out, kind, 0).astype(np.uint8),
         normals=np.where(flat_out[:, None], np.nan, normals),
         noise_free=np.where(flat_out[:, None], xyz, noise_free),
@@ -229,23 +227,34 @@ def _look(solid: Solid, tree: RayTree, pose: np.ndarray, projection: str, pitch:
     return rays, cast(tree, rays.origins.reshape(-1, 3), rays.directions.reshape(-1, 3))
 
 
-def _seen_creases(solid: Solid, tree: RayTree, pose: np.ndarray, projection: str, spacing: float) -> TrueEdges:
+def _sensor_edges(solid: Solid, tree: RayTree, pose: np.ndarray, projection: str, spacing: float) -> TrueEdges:
     """Sample the creases that show, in the sensor's frame."""
-    edges = sample_curves(solid.creases, STEP * spacing)
     rotation, shift = pose[:3, :3], pose[:3, 3]
-    moved = edges.positions @ rotation.T + shift
-    edges = TrueEdges(
-        moved, edges.kind, edges.tangents @ rotation.T, edges.normals @ rotation.T, edges.dihedral, edges.convex
+    creases = sample_curves(solid.creases, STEP * spacing)
+    moved = creases.positions @ rotation.T + shift
+    from_ = moved * (1, 1, 0) if projection == "orthographic" else np.zeros_like(moved)
+    creases = creases.take(shows(creases, (from_ - shift) @ rotation, solid, tree, spacing))
+    return replace(
+        creases,
+        positions=creases.positions @ rotation.T + shift,
+        tangents=creases.tangents @ rotation.T,
+        normals=creases.normals @ rotation.T,
     )
-    if projection == "orthographic":
-        origins, rays = moved * (1, 1, 0), moved * (0, 0, 1)
-    else:
-        origins, rays = np.zeros_like(moved), moved
-    sight = rays / np.linalg.norm(rays, axis=1, keepdims=True)
-    facing = -np.einsum("ijk,ik->ij", edges.normals, sight)
-    shows = (facing > _GRAZING).all(axis=1)
+
+
+def shows(creases: TrueEdges, eyes: np.ndarray, solid: Solid, tree: RayTree, spacing: float) -> np.ndarray:
+    """Tell which places of creases show both their faces to eyes (T, 3), one for each, and are not hidden; (T,) bool."""
+    rays = creases.positions - eyes
+    length = np.linalg.norm(rays, axis=1)
+    sight = rays / length[:, None]
+    facing = -np.einsum("ijk,ik->ij", creases.normals, sight)
+    both = (facing > _GRAZING).all(axis=1)
     if solid.boundaries:
-        shows |= (facing < -_GRAZING).all(axis=1)
-    hits = cast(tree, (origins - shift) @ rotation, sight @ rotation)
-    clear = hits.distance >= np.linalg.norm(rays, axis=1) - _SEEN * spacing
-    return edges.take(shows & clear)
+        both |= (facing < -_GRAZING).all(axis=1)
+    return both & (cast(tree, eyes, sight).distance >= length - _SEEN * spacing)
+
+
+def outline_edges(places: np.ndarray, kind: np.ndarray, normals: np.ndarray) -> TrueEdges:
+    """Make edges of the places (N, 3) whose flags (N,) say that the depth breaks off there."""
+    flags = (EdgeKind.BOUNDARY, EdgeKind.OCCLUDING, EdgeKind.OCCLUDED)
+    return join([point_edges(places[(kind & flag) > 0], flag, normals[(kind & flag) > 0]) for flag in flags])
