@@ -243,7 +243,7 @@ def _sensor_edges(solid: Solid, tree: RayTree, pose: np.ndarray, projection: str
 
 
 def shows(creases: TrueEdges, eyes: np.ndarray, solid: Solid, tree: RayTree, spacing: float) -> np.ndarray:
-    """Tell which places of creases show both their faces to eyes (T, 3), one for each, and are not hidden; (T,) bool."""
+    """Tell which places of creases show both their faces, unhidden, to eyes (T, 3), one for each; (T,) bool."""
     rays = creases.positions - eyes
     length = np.linalg.norm(rays, axis=1)
     sight = rays / length[:, None]

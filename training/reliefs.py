@@ -7,8 +7,9 @@ over several spacings no single row of points is the edge, so a band is.
 from __future__ import annotations
 
 import numpy as np
+from random_scenes import Example
 
-from edgel.synth.sample import _keep_apart
+from edgel.synth import poisson_disc
 
 SMOOTH = 0.25  # share of the reliefs that have no edge at all
 LEAST_TURN = np.radians(18.0)
@@ -17,8 +18,8 @@ BAND, OPEN = 0.3, 0.7  # of half the rounding's width: the edge's band; and up t
 DISC = 0.752  # see edgel.synth.sample
 
 
-def make(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Make a relief with a spacing of 1: places (N, 3), labels (N, 2), which count (N,), and the spacing."""
+def make(rng: np.random.Generator) -> Example:
+    """Make a relief with a spacing of 1."""
     side = np.sqrt(np.exp(rng.uniform(np.log(4000), np.log(14000))))
     ground = _Ground(rng, side)
     curves = [] if rng.random() < SMOOTH else [_Curve(rng, side, ground.bend) for _ in range(rng.integers(1, 7))]
@@ -35,17 +36,17 @@ def make(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray, 
         fine = rng.uniform(0.4, 0.7)
         apart = np.flatnonzero(~near)
         kept = np.concatenate(
-            [np.flatnonzero(near)[_keep_apart(places[near], fine * DISC)], apart[_keep_apart(places[apart], DISC)]]
+            [np.flatnonzero(near)[poisson_disc(places[near], fine * DISC)], apart[poisson_disc(places[apart], DISC)]]
         )
     else:
-        kept = np.flatnonzero(_keep_apart(places, DISC))
+        kept = np.flatnonzero(poisson_disc(places, DISC))
     places, true, open_ = places[kept], true[kept], open_[kept]
     rim = np.minimum(places[:, :2], side - places[:, :2]).min(axis=1)
     labels = np.column_stack([true, rim < 0.45])
     counts = (~open_ | true) & ~((rim >= 0.45) & (rim < 1.2))
     noise = rng.choice([0.0, rng.uniform(0, 0.1), rng.uniform(0.1, 0.4)], p=[0.7, 0.2, 0.1])
     turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
-    return (places + noise * rng.standard_normal(places.shape)) @ turn.T, labels, counts, 1.0
+    return Example((places + noise * rng.standard_normal(places.shape)) @ turn.T, labels, counts, 1.0)
 
 
 class _Ground:

@@ -1,160 +1,45 @@
-"""Random scenes to train on: shapes, sizes, patterns, views, noise and outliers drawn from a seed. None is a scene of the benchmark."""
+"""Random solids to train on, of thirteen families, stretched and sheared, alone or several in one another."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-import relief
 
-from edgel import metrics, synth
-from edgel.edges import EdgeKind
-from edgel.synth import EdgeCurve, Scene, Solid
-from edgel.synth.curved import _patches, _rounded
-from edgel.synth.polyhedra import blocks, ridge
+from edgel import synth
+from edgel.synth import EdgeCurve, Solid
 
-OUTLINE = int(EdgeKind.BOUNDARY | EdgeKind.OCCLUDING | EdgeKind.OCCLUDED)
-MIN_TURN = np.radians(25.0)
+ASSEMBLIES = 0.12  # share of the solids that are several bodies
+WARPED = 0.35  # share of the bodies that are stretched and sheared
 
 
-RELIEFS = 0.1  # share of the examples
-IN_STEPS = 0.4  # share of the views that are those of a depth camera
-
-
-@dataclass(frozen=True, eq=False)
-class Example:
-    """A cloud to learn from.
-
-    Attributes
-    ----------
-    xyz : (N, 3) float64
-    labels : (N, 2) bool
-        Which points lie on a crease, and where the surface ends.
-    counts : (N,) bool
-        Which points are learned from.
-    spacing : float
-    """
-
-    xyz: np.ndarray
-    labels: np.ndarray
-    counts: np.ndarray
-    spacing: float
-
-
-def example(seed: int) -> Example:
-    """Make the example of a seed."""
-    rng = np.random.default_rng([seed, 20261125])
-    if rng.random() < RELIEFS:
-        return Example(*relief.make(rng))
-    made = scene(rng)
-    true, counts = labels(made)
-    return Example(made.cloud.xyz[np.isfinite(made.cloud.xyz).all(axis=1)], true, counts, made.spacing)
-
-
-def scene(rng: np.random.Generator) -> Scene:
-    """Make a scene of a solid."""
+def solid(rng: np.random.Generator) -> Solid:
+    """Make a solid."""
     while True:
         try:
-            solid = _assembly(rng) if rng.random() < 0.12 else _single(rng)
-            if np.isfinite(solid.area):
-                break
+            made = _assembly(rng) if rng.random() < ASSEMBLIES else _single(rng)
+            if np.isfinite(made.area):
+                return made
         except ValueError:  # cells that touch along an edge only are no surface
             continue
-    points = np.exp(rng.uniform(np.log(3000), np.log(15000)))
-    noise = [0.0, rng.uniform(0, 0.15), rng.uniform(0.15, 0.5), rng.uniform(0.5, 1.1)][
-        rng.choice(4, p=[0.3, 0.2, 0.3, 0.2])
-    ]
-    degraded = {
-        "noise": noise,
-        "outliers": [0.0, 0.01, 0.05][rng.choice(3, p=[0.75, 0.15, 0.1])],
-        "seed": int(rng.integers(2**31)),
-    }
-    if rng.random() < 0.35:
-        direction = rng.standard_normal(3)
-        projection = synth.PROJECTIONS[rng.integers(3)]
-        spacing = np.sqrt(solid.area / 2.2 / points)
-        seen = synth.view(
-            solid, projection=projection, spacing=spacing, direction=direction, roll=rng.uniform(-3, 3), **degraded
-        )
-        return in_steps(seen, projection, rng) if rng.random() < IN_STEPS else seen
-    pattern = rng.choice(synth.PATTERNS, p=[0.17, 0.17, 0.14, 0.14, 0.38])
-    return synth.sample(solid, pattern=str(pattern), spacing=np.sqrt(solid.area / points), **degraded)
-
-
-def in_steps(scene: Scene, projection: str, rng: np.random.Generator) -> Scene:
-    """See a scene as depth cameras do: errors alike in neighbouring pixels, and depths rounded to whole steps.
-
-    A slanted face becomes a staircase whose stairs have ragged rims.
-    """
-    xyz = scene.noise_free
-    depth = np.linalg.norm(xyz, axis=1) if projection == "spherical" else xyz[:, 2]
-    step, error = scene.spacing * _spread(rng, 0.2, 3, 2)
-    field = rng.standard_normal(scene.cloud.shape)
-    for _ in range(rng.integers(1, 7)):  # patches of a few pixels
-        for axis in (0, 1):
-            field = (np.roll(field, -1, axis) + 2 * field + np.roll(field, 1, axis)) / 4
-    error *= rng.uniform(0, 0.5) / field.std()
-    measured = np.where(scene.outlier, depth, step * np.round((depth + error * field.ravel()) / step))
-    if projection == "orthographic":
-        moved = np.column_stack([xyz[:, :2], measured])
-    else:
-        moved = xyz * (measured / depth)[:, None]
-    return replace(scene, cloud=replace(scene.cloud, xyz=moved))
-
-
-def labels(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Which finite points are edge points, (M, 2) bool for crease and outline, and which count, (M,) bool.
-
-    A crease point is one whose cell among all points (by where they lie without noise) the crease runs through: it is
-    nearest to some stretch of it. So edges are one point thick and without gaps, whatever the pattern.
-    """
-    rows = np.flatnonzero(np.isfinite(scene.cloud.xyz).all(axis=1))
-    true, counts = np.zeros((len(rows), 2), bool), np.ones(len(rows), bool)
-    places = scene.noise_free[rows]
-    inlier = ~scene.outlier[rows]
-    organized = scene.cloud.is_organized
-    kinds = [EdgeKind.CREASE] if organized else [EdgeKind.CREASE, EdgeKind.BOUNDARY]
-    for kind in kinds:
-        edges = scene.edges.take((scene.edges.kind & int(kind)) > 0)
-        if len(edges) == 0:
-            continue
-        strong = np.nan_to_num(edges.dihedral, nan=np.pi) >= MIN_TURN
-        here = np.flatnonzero(inlier)
-        for wanted, mark in ((True, true[:, int(kind == EdgeKind.BOUNDARY)]), (False, None)):
-            at = edges.positions[strong == wanted]
-            if len(at) == 0:
-                continue
-            near = metrics.nearest(at, places[here])
-            own = near.distances[:, 0] <= (1.5 if wanted else 3) * scene.spacing
-            found = here[near.points[own, 0]]
-            if mark is not None:
-                mark[found] = True
-            else:
-                back = metrics.nearest(places, at).distances[:, 0]
-                counts &= ~(back < 1.5 * scene.spacing)
-    counts |= true.any(axis=1)
-    if organized:
-        true[:, 1] = (scene.point_kind[rows] & OUTLINE) > 0
-    true[~inlier] = False
-    return true, counts
 
 
 def _single(rng: np.random.Generator) -> Solid:
-    solid = _solid(rng)
-    if not np.isfinite(solid.area):
+    body = list(_SHARES)[rng.choice(len(_SHARES), p=np.array(list(_SHARES.values())) / 100)](rng)
+    if not np.isfinite(body.area):
         raise ValueError("solid: a side of no length")
-    return _warped(solid, _matrix(rng)) if rng.random() < 0.35 else solid
+    return _warped(body, _matrix(rng)) if rng.random() < WARPED else body
 
 
 def _matrix(rng: np.random.Generator) -> np.ndarray:
     """Stretch and shear: right angles become any."""
-    matrix = np.diag(_spread(rng, 0.5, 1.6, 3)) + np.triu(rng.uniform(-0.9, 0.9, (3, 3)), 1)
+    matrix = np.diag(log_uniform(rng, 0.5, 1.6, 3)) + np.triu(rng.uniform(-0.9, 0.9, (3, 3)), 1)
     turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
     return turn @ matrix @ turn.T
 
 
-def _warped(solid: Solid, matrix: np.ndarray, shift: Sequence[float] | np.ndarray = (0, 0, 0)) -> Solid:
+def _warped(body: Solid, matrix: np.ndarray, shift: Sequence[float] | np.ndarray = (0, 0, 0)) -> Solid:
     """Map a solid; the determinant has to be positive."""
     back = np.linalg.inv(matrix)
 
@@ -164,16 +49,16 @@ def _warped(solid: Solid, matrix: np.ndarray, shift: Sequence[float] | np.ndarra
 
     def curves(those: tuple[EdgeCurve, ...]) -> tuple[EdgeCurve, ...]:
         return tuple(
-            EdgeCurve(c.kind, c.points @ matrix.T + shift, None if c.normals is None else turned(c.normals))
+            replace(c, points=c.points @ matrix.T + shift, normals=None if c.normals is None else turned(c.normals))
             for c in those
         )
 
     return replace(
-        solid,
-        vertices=solid.vertices @ matrix.T + shift,
-        normals=turned(solid.normals),
-        creases=curves(solid.creases),
-        boundaries=curves(solid.boundaries),
+        body,
+        vertices=body.vertices @ matrix.T + shift,
+        normals=turned(body.normals),
+        creases=curves(body.creases),
+        boundaries=curves(body.boundaries),
     )
 
 
@@ -203,17 +88,13 @@ def _assembly(rng: np.random.Generator) -> Solid:
     )
 
 
-def _solid(rng: np.random.Generator) -> Solid:
-    return list(_SHARES)[rng.choice(len(_SHARES), p=np.array(list(_SHARES.values())) / 100)](rng)
-
-
-def _spread(rng: np.random.Generator, low: float, high: float, *size: int) -> np.ndarray:
+def log_uniform(rng: np.random.Generator, low: float, high: float, *size: int) -> np.ndarray:
     """Draw so that every doubling is as likely as the next."""
     return np.exp(rng.uniform(np.log(low), np.log(high), size))
 
 
 def _ticks(rng: np.random.Generator, count: int, low: float, high: float) -> np.ndarray:
-    return np.concatenate([[0], np.cumsum(_spread(rng, low, high, count))])
+    return np.concatenate([[0], np.cumsum(log_uniform(rng, low, high, count))])
 
 
 def _cells(rng: np.random.Generator) -> Solid:
@@ -221,8 +102,8 @@ def _cells(rng: np.random.Generator) -> Solid:
     filled = rng.random(shape) < rng.uniform(0.4, 1)
     if not filled.any():
         raise ValueError("filled: nothing")
-    low = _spread(rng, 0.6, 6, 1)[0]
-    return blocks("cells", filled, *(_ticks(rng, n, low, low * 8) for n in shape), spacing=0.8)
+    low = log_uniform(rng, 0.6, 6, 1)[0]
+    return synth.blocks("cells", filled, *(_ticks(rng, n, low, low * 8) for n in shape), spacing=0.8)
 
 
 def _plate_with_cells(rng: np.random.Generator) -> Solid:
@@ -230,7 +111,7 @@ def _plate_with_cells(rng: np.random.Generator) -> Solid:
     filled = rng.random(shape) < rng.uniform(0.2, 0.5)
     filled[:, :, 0] = True
     filled[:, :, 2] &= filled[:, :, 1]
-    return blocks("plate_with_cells", filled, *(_ticks(rng, n, 0.7, 12) for n in shape), spacing=0.8)
+    return synth.blocks("plate_with_cells", filled, *(_ticks(rng, n, 0.7, 12) for n in shape), spacing=0.8)
 
 
 def _frustum(rng: np.random.Generator) -> Solid:
@@ -243,7 +124,7 @@ def _ridges(rng: np.random.Generator) -> Solid:
     x = np.cumsum(rng.uniform(2, 14, count))
     z = np.cumsum(rng.standard_normal(count) * rng.uniform(1, 12))
     profile = np.column_stack([x, z - z.min()])
-    return ridge("ridges", profile, width=rng.uniform(15, 60), base=rng.uniform(2, 20), spacing=0.8)
+    return synth.ridge("ridges", profile, width=rng.uniform(15, 60), base=rng.uniform(2, 20), spacing=0.8)
 
 
 def _turned(rng: np.random.Generator) -> Solid:
@@ -262,17 +143,17 @@ def _prism(rng: np.random.Generator) -> Solid:
     angle = np.sort((np.arange(count) + rng.uniform(-0.35, 0.35, count)) * 2 * np.pi / count)
     radius = rng.uniform(10, 35)
     corners = np.column_stack([radius * np.cos(angle), rng.uniform(0.3, 1) * radius * np.sin(angle)])
-    return synth.prism(corners.tolist(), height=float(_spread(rng, 1, 40, 1)[0]), fillets=_fillets(rng, count))
+    return synth.prism(corners.tolist(), height=float(log_uniform(rng, 1, 40, 1)[0]), fillets=_fillets(rng, count))
 
 
 def _fillets(rng: np.random.Generator, count: int) -> np.ndarray:
-    return np.where(rng.random(count) < rng.choice([0.0, 0.5, 0.8, 1.0]), _spread(rng, 1, 7, count), 0)
+    return np.where(rng.random(count) < rng.choice([0.0, 0.5, 0.8, 1.0]), log_uniform(rng, 1, 7, count), 0)
 
 
 def _rounded_box(rng: np.random.Generator) -> Solid:
     """A box all of whose edges are rounded, or its upper half alone on a sharp-edged bottom."""
-    half = _spread(rng, 3, 25, 3)
-    radius = float(_spread(rng, 0.8, 8, 1)[0])
+    half = log_uniform(rng, 3, 25, 3)
+    radius = float(log_uniform(rng, 0.8, 8, 1)[0])
     radius = min(radius, 0.9 * float(half.min()))
     core = half - radius
     cut = rng.random() < 0.5
@@ -299,7 +180,7 @@ def _rounded_box(rng: np.random.Generator) -> Solid:
         patches += [
             _under(points) for points, _ in patches if np.ptp(points[..., 2]) > 0 and (points[..., 2] == 0).any()
         ]
-    return _patches("rounded_box", patches, spacing=0.8)
+    return synth.from_patches("rounded_box", patches, spacing=0.8)
 
 
 def _under(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -322,9 +203,9 @@ def _blended(rng: np.random.Generator) -> Solid:
     width = rng.uniform(10, 50)
     corners = [(x[0], 0.0), (x[-1], 0.0), *map(tuple, top[::-1].tolist())]
     radii = np.concatenate(
-        [[0, 0], np.where(rng.random(count) < rng.choice([0.5, 0.9, 1.0]), _spread(rng, 0.8, 7, count), 0)]
+        [[0, 0], np.where(rng.random(count) < rng.choice([0.5, 0.9, 1.0]), log_uniform(rng, 0.8, 7, count), 0)]
     )
-    pieces = _rounded(np.asarray(corners), radii, closed=True, spacing=0.8)
+    pieces = synth.round_corners(np.asarray(corners), radii, closed=True, spacing=0.8)
     steps = np.unique(np.concatenate([points[:, 0] for points, _ in pieces]))  # the bottom shares the walls' corners
     pieces[0] = (np.column_stack([steps, np.zeros_like(steps)]), np.tile([0.0, -1.0], (len(steps), 1)))
     patches = []
@@ -336,7 +217,7 @@ def _blended(rng: np.random.Generator) -> Solid:
             for rim, side in ((line, -1), (back, 1)):
                 wall = np.stack([rim, rim * (1, 1, 0)], axis=1)[::-side]
                 patches.append((wall, np.broadcast_to([0.0, side, 0.0], wall.shape)))
-    return _patches("blended", patches, spacing=0.8)
+    return synth.from_patches("blended", patches, spacing=0.8)
 
 
 def _thin(rng: np.random.Generator) -> Solid:

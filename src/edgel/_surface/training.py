@@ -1,0 +1,91 @@
+"""What the training of the trees takes from a cloud: features by points, with the index kept out of sight."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from edgel._neighbors.kdtree import NeighborIndex, build_index, leaf_starts
+from edgel._surface.evidence import Evidence, gather_evidence, with_context
+from edgel._surface.forest import Forest
+from edgel._surface.leaves import describe_leaves
+from edgel._surface.screen import Screening, screen
+from edgel._surface.statistics import cloud_statistics, describe_places
+
+
+@dataclass(frozen=True, eq=False)
+class ScreeningFeatures:
+    """What the two screenings hear of a cloud.
+
+    Attributes
+    ----------
+    leaves : (L, len(LEAF)) float32
+        Of each leaf of the index, by `edgel._surface.features.LEAF`.
+    leaf : (N,) int64
+        The leaf that each point lies in.
+    points : (M,) int64
+        The points asked for, in the order of the index.
+    features : (M, NUM_SCREEN) float32
+        Of each of them, the first columns of `edgel._surface.features.POINT`.
+    """
+
+    leaves: np.ndarray
+    leaf: np.ndarray
+    points: np.ndarray
+    features: np.ndarray
+
+
+def screening_features(xyz: np.ndarray, asked: np.ndarray) -> ScreeningFeatures:
+    """Describe all leaves of a cloud (N, 3), and the points asked for, (N,) bool."""
+    index = build_index(np.ascontiguousarray(xyz))
+    values = cloud_statistics(index).values
+    places = np.flatnonzero(asked[index.order])
+    leaf = np.empty(len(index), np.int64)
+    sizes = np.diff(leaf_starts(index))
+    leaf[index.order] = np.repeat(np.arange(len(sizes)), sizes)
+    leaves, features = (
+        np.concatenate([part, np.broadcast_to(values, (len(part), len(values)))], axis=1)
+        for part in (describe_leaves(index).features, describe_places(index, places))
+    )
+    return ScreeningFeatures(leaves, leaf, index.order[places], features)
+
+
+@dataclass(frozen=True, eq=False)
+class ScreenedCloud:
+    """A cloud after the screening; made by `screen_cloud`."""
+
+    index: NeighborIndex
+    screening: Screening
+
+    @property
+    def probability(self) -> np.ndarray:
+        """Of an edge at each point, (N,) float32, by the cheap evidence."""
+        probability = np.empty(len(self.index), np.float32)
+        probability[self.index.order] = self.screening.probability
+        return probability
+
+    def gather_evidence(self, asked: np.ndarray) -> tuple[np.ndarray, Evidence]:
+        """Return the points (M,) asked for, (N,) bool, in the order of the index, and the costly evidence of each."""
+        places = np.flatnonzero(asked[self.index.order])
+        return self.index.order[places], gather_evidence(self.index, self.screening, places)
+
+
+def screen_cloud(xyz: np.ndarray, forests: Mapping[str, Forest]) -> ScreenedCloud:
+    """Screen a cloud (N, 3) with the forests "leaf" and "screen"."""
+    index = build_index(np.ascontiguousarray(xyz))
+    return ScreenedCloud(index, screen(index, cloud_statistics(index), forests))
+
+
+def add_context(
+    xyz: np.ndarray, points: np.ndarray, evidence: Evidence, crease: np.ndarray, outline: np.ndarray
+) -> np.ndarray:
+    """Add to the evidence of some points (M,) of a cloud, in the order of its index, what their context says.
+
+    See `edgel._surface.evidence.with_context`.
+    """
+    index = build_index(np.ascontiguousarray(xyz))
+    place = np.empty(len(index), np.int64)
+    place[index.order] = np.arange(len(index))
+    return with_context(index, place[points], evidence, crease, outline)
