@@ -5,6 +5,7 @@ Run: python benchmarks/errata.py
 
 import time
 
+import fittings
 import numpy as np
 
 from edgel import paper, synth
@@ -64,7 +65,7 @@ def main() -> None:
             print("normalised\n", gaussian_kernel(size, sigma), sep="")
     print(f"sum of eq. 9 as printed: {EQ_9.sum():.4f}")
     for part in (synth.tee(), synth.elbow()):
-        points = synth.scan(part).cloud.xyz
+        points = fittings.scan(part).cloud.xyz
         found = paper.detect(points)
         hits = code_1_hits(points, found)
         seconds = code_1_seconds(points, found)

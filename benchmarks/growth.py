@@ -13,7 +13,8 @@ import json
 import subprocess
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,12 +23,13 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import edgel
+from edgel import paper
 
 DOCS = Path(__file__).parent.parent / "docs" / "benchmarks"
-METHODS: dict[str, dict[str, Any]] = {
-    "paper": {"preset": "paper"},
-    "projection": {"method": "orthographic"},
-    "surface": {"method": "surface"},
+METHODS: dict[str, Callable[[np.ndarray], object]] = {
+    "paper": paper.detect,
+    "projection": partial(edgel.detect, method="orthographic"),
+    "surface": partial(edgel.detect, method="surface"),
 }
 
 
@@ -65,13 +67,13 @@ def forget_peak() -> None:
 
 def measure(method: str, count: int, rounds: int) -> dict[str, Any]:
     """Median seconds and the peak above the input, in this process."""
-    edgel.detect(plateau(20_000), **METHODS[method])  # compiles
+    METHODS[method](plateau(20_000))  # compiles
     points = plateau(count)
     forget_peak()
     before, seconds = peak(), []
     for _ in range(rounds):
         start = time.perf_counter()
-        edgel.detect(points, **METHODS[method])
+        METHODS[method](points)
         seconds.append(time.perf_counter() - start)
     return {
         "method": method,
@@ -142,7 +144,7 @@ def plot(rows: Sequence[Mapping[str, Any]]) -> Figure:
         axes.plot(
             [row["points"] for row in mine], [1e9 * row["seconds"] / row["points"] for row in mine], "o-", label=method
         )
-    axes.set(xscale="log", yscale="log", xlabel="points", ylabel="ns for each point", title="edgel.detect, two threads")
+    axes.set(xscale="log", yscale="log", xlabel="points", ylabel="ns for each point", title="two threads")
     axes.grid(alpha=0.3)
     axes.legend()
     return figure

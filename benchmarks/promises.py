@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import fittings
 import laspy
 import numpy as np
 from errata import code_1_seconds
@@ -42,7 +43,7 @@ def run(rounds: int = 7) -> list[Row]:
 
 def of_tee(rounds: int) -> list[Row]:
     """All-point normals, the paper and the default on the published parts, in one interleaved run."""
-    points = synth.scan(synth.tee()).cloud.xyz
+    points = fittings.scan(synth.tee()).cloud.xyz
     found = paper.detect(points)
     work: dict[str, Callable[[], float]] = {
         rival.name: lambda rival=rival: rival.run(points, K)[1] for rival in NORMALS if rival.missing() is None
@@ -81,7 +82,7 @@ def of_tee(rounds: int) -> list[Row]:
         ),
         _paper_share("tee", times["paper"], image + own),
     ]
-    elbow = synth.scan(synth.elbow()).cloud.xyz
+    elbow = fittings.scan(synth.elbow()).cloud.xyz
     of_elbow = interleaved(
         {
             "image": lambda: sum(paper.detect(elbow).seconds[stage] for stage in ONE_EACH),
@@ -141,7 +142,7 @@ def of_parts(rounds: int) -> list[Row]:
 
 
 def sampled(solid: Solid, count: int) -> np.ndarray:
-    """Points strewn over all of a solid, in random order."""
+    """Points at random over all of a solid, in random order."""
     return synth.sample(solid, spacing=float(np.sqrt(solid.area / count))).cloud.xyz
 
 
@@ -149,7 +150,7 @@ def of_processes(rounds: int) -> list[Row]:
     """Import, the command line with a warm cache, and the first run of all, which compiles."""
     with tempfile.TemporaryDirectory() as folder:
         cloud, edges = Path(folder, "tee.ply"), Path(folder, "edges.ply")
-        edgel.write(cloud, synth.scan(synth.tee()).cloud)
+        edgel.write(cloud, fittings.scan(synth.tee()).cloud)
         detect = [str(Path(sys.executable).with_name("edgel")), "detect", str(cloud), "-o", str(edges)]
         cold = _process(detect, os.environ | {"NUMBA_CACHE_DIR": str(Path(folder, "cache"))})
         _process(detect)
@@ -179,7 +180,7 @@ def _process(command: Sequence[str], environment: Any = None) -> float:
 
 def of_files(rounds: int) -> list[Row]:
     """Throughput of binary PLY, and LAZ against laspy with lazrs alone; files warm in the page cache."""
-    points = synth.scan(synth.tee()).cloud.xyz
+    points = fittings.scan(synth.tee()).cloud.xyz
     with tempfile.TemporaryDirectory() as folder:
         ply, laz = Path(folder, "tee.ply"), Path(folder, "tee.laz")
         cloud = edgel.Cloud(np.tile(points, (4, 1)))

@@ -15,12 +15,16 @@ from typing import Any
 
 import numpy as np
 
-from edgel import evidence, paper, synth
+from edgel import synth
+from edgel._kernels.parallel import kernel, run_slices
+from edgel._neighbors.candidates import every_place, every_point
 from edgel._neighbors.kdtree import _SHARED_LEVELS, bounds, build_index
 from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.normals import by_offset, fit_planes
-from edgel._kernels.parallel import kernel, run_slices
-from edgel.paper.projection import back_project, grey_image, occupied_spacing, points_near, project
+from edgel._neighbors.spacing import occupied_spacing
+from edgel._surface import classify, cloud_statistics, screen
+from edgel.paper.method import canny_of_projection, choose_grid, choose_tolerance, local_plane_fits
+from edgel.paper.projection import back_project, grey_image, points_near, project
 
 K = 16
 CANDIDATES = 94  # points whose distance a query measures, the blocks of eight within its reach
@@ -44,20 +48,21 @@ def _copy(start, stop, source, target):
 
 
 @kernel
-def _look(first, places, squared, queries, order, xyz):
+def _nothing(first, places, squared, queries, targets, xyz):
     pass
 
 
 def stages(points: np.ndarray) -> list[Stage]:
     """The stages of the paper's method, of normals at all points, and the two long ones of the default detector."""
     lower, upper = bounds(points)
-    grid = paper.choose_grid(points, None, None)
+    grid = choose_grid(points, None, None)
     image = np.pad(grey_image(project(points, grid), grid, 100.0), grid.frame)
-    found = paper.canny_of_projection(image, 5, 1.4, 16.0, 40.0)
-    window = paper.choose_tolerance(None, grid)
+    found = canny_of_projection(image, 5, 1.4, 16.0, 40.0)
+    window = choose_tolerance(None, grid)
     rows = back_project(points, grid, found.edges, found.magnitude, window).rows
     share, index = len(rows) / len(points), build_index(points)
-    surveyed = evidence.survey(index)
+    statistics = cloud_statistics(index)
+    screening = screen(index, statistics)
     levels = max(-(-len(points) // 16) - 1, 1).bit_length()
     search = CANDIDATES * (8 + 6 * COUNTS)
     pixels = image.size / len(points)
@@ -65,7 +70,7 @@ def stages(points: np.ndarray) -> list[Stage]:
         Stage("bounding box", lambda: bounds(points), 24, 6),
         Stage("spacing", lambda: occupied_spacing(points, lower, upper), 40, 8),
         Stage("projection", lambda: project(points, grid), 64, 10),
-        Stage("Canny", lambda: paper.canny_of_projection(image, 5, 1.4, 16.0, 40.0), 150 * pixels, 60 * pixels),
+        Stage("Canny", lambda: canny_of_projection(image, 5, 1.4, 16.0, 40.0), 150 * pixels, 60 * pixels),
         Stage(
             "back-projection",
             lambda: back_project(points, grid, found.edges, found.magnitude, window),
@@ -75,19 +80,22 @@ def stages(points: np.ndarray) -> list[Stage]:
         Stage("points near edges", lambda: points_near(points, grid, rows, 2.99 * max(grid.pixel)), 26, 8),
         Stage(
             "edge normals",
-            lambda: by_offset(paper.local_plane_fits(points, grid, rows, K)),
+            lambda: by_offset(local_plane_fits(points, grid, rows, K)),
             26 + share * 300,
             8 + 2 * share * (search + CANDIDATES * 21 + 600),
         ),
         # Levels below the shared ones stay in a core's cache; each reads the keys four times and moves the points.
         Stage("k-d tree", lambda: build_index(points), 56 + 96 * min(levels, _SHARED_LEVELS) + 96, 20 * levels),
-        Stage("normals of all", lambda: fit_planes(index, index, K), 80, search + CANDIDATES * 21 + 600),
+        Stage("normals of all", lambda: fit_planes(index, every_point(index), K), 80, search + CANDIDATES * 21 + 600),
         Stage(
-            "lists of neighbours", lambda: visit_neighbors(_look, index, index, K), 32 + 32 * K, search + CANDIDATES * 3
+            "lists of neighbours",
+            lambda: visit_neighbors(_nothing, every_place(index), index, K),
+            32 + 32 * K,
+            search + CANDIDATES * 3,
         ),
         # Of the default detector; how much is computed depends on the cloud.
-        Stage("survey", lambda: evidence.survey(index), 24 + 2 * 48 + 8),
-        Stage("evidence", lambda: evidence.judge(index, surveyed), 8),
+        Stage("screening", lambda: screen(index, statistics), 24 + 2 * 48 + 8),
+        Stage("classification", lambda: classify(index, screening), 8),
     ]
 
 

@@ -6,11 +6,12 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import fittings
 import numpy as np
 from rivals import NORMALS, RIVALS
 
 import edgel
-from edgel import synth
+from edgel import paper, synth
 from edgel._neighbors.kdtree import build_index
 
 ROUNDS = 5
@@ -67,14 +68,14 @@ def edges(sizes: Sequence[int], slowest: float = SLOWEST) -> list[dict[str, Any]
 
 
 def stages(rounds: int = ROUNDS) -> list[dict[str, Any]]:
-    """Stages of both presets on the tee as the paper has it."""
-    points = synth.scan(synth.tee()).cloud.xyz
+    """Stages of the published method and of the default one on the tee as the paper has it."""
+    points = fittings.scan(synth.tee()).cloud.xyz
     rows = []
-    for preset in ("paper", "default"):
-        edgel.detect(points, preset=preset)
-        runs = [edgel.detect(points, preset=preset).seconds for _ in range(rounds)]
+    for method, detect in (("paper", paper.detect), ("default", edgel.detect)):
+        detect(points)
+        runs = [detect(points).seconds for _ in range(rounds)]
         rows += [
-            {"preset": preset, "stage": stage, "seconds": float(np.median([run[stage] for run in runs]))}
+            {"method": method, "stage": stage, "seconds": float(np.median([run[stage] for run in runs]))}
             for stage in runs[0]
         ]
     return rows

@@ -1,4 +1,4 @@
-"""Speed of the hot kernels and of whole presets, to compare two commits in under two minutes each.
+"""Speed of the hot kernels and of whole methods, to compare two commits in under two minutes each.
 
     pytest benchmarks/test_speed.py --benchmark-autosave     (on one commit, then on the other)
     pytest-benchmark compare --group-by=name --columns=min,median
@@ -17,11 +17,13 @@ import pytest
 
 import edgel
 from edgel import paper, synth
-from edgel.paper.canny import canny
-from edgel.io import ply
+from edgel._neighbors.candidates import every_point
 from edgel._neighbors.kdtree import bounds, build_index
 from edgel._neighbors.knn import knn
 from edgel._neighbors.normals import fit_planes
+from edgel.io import ply
+from edgel.paper.canny import canny
+from edgel.paper.method import choose_grid
 from edgel.paper.projection import back_project, project
 
 
@@ -54,12 +56,12 @@ def test_knn(benchmark: Any, points: np.ndarray, k: int) -> None:
 
 def test_plane_fits(benchmark: Any, points: np.ndarray) -> None:
     index = build_index(points)
-    assert benchmark(fit_planes, index, index, 16).num_undefined == 0
+    assert benchmark(fit_planes, index, every_point(index), 16).num_undefined == 0
 
 
 def test_plane_fits_of_a_lattice(benchmark: Any, lattice: np.ndarray) -> None:
     index = build_index(lattice)
-    assert benchmark(fit_planes, index, index, 16).num_undefined == 0
+    assert benchmark(fit_planes, index, every_point(index), 16).num_undefined == 0
 
 
 def test_normals(benchmark: Any, points: np.ndarray) -> None:
@@ -67,7 +69,7 @@ def test_normals(benchmark: Any, points: np.ndarray) -> None:
 
 
 def test_projection(benchmark: Any, points: np.ndarray) -> None:
-    grid = paper.choose_grid(points, None, None)
+    grid = choose_grid(points, None, None)
     assert benchmark(project, points, grid).shape == (grid.height, grid.width)
 
 
@@ -77,15 +79,15 @@ def test_canny(benchmark: Any) -> None:
 
 
 def test_back_projection(benchmark: Any, points: np.ndarray) -> None:
-    grid = paper.choose_grid(points, None, None)
+    grid = choose_grid(points, None, None)
     edges = np.random.default_rng(0).random((grid.height + 2, grid.width + 2)) < 0.05
     assert len(benchmark(back_project, points, grid, edges, edges * 50.0, max(grid.pixel)).rows)
 
 
-@pytest.mark.parametrize("preset", ["paper", "default"])
-def test_preset(benchmark: Any, points: np.ndarray, preset: Any) -> None:
-    edgel.detect(points, preset=preset)
-    assert len(benchmark.pedantic(edgel.detect, (points,), {"preset": preset}, rounds=5))
+@pytest.mark.parametrize("detect", [paper.detect, edgel.detect], ids=["paper", "default"])
+def test_method(benchmark: Any, points: np.ndarray, detect: Any) -> None:
+    detect(points)
+    assert len(benchmark.pedantic(detect, (points,), rounds=5))
 
 
 @pytest.mark.parametrize("direction", ["read", "write"])

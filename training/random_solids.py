@@ -63,7 +63,7 @@ def _warped(body: Solid, matrix: np.ndarray, shift: Sequence[float] | np.ndarray
 
 
 def _assembly(rng: np.random.Generator) -> Solid:
-    """Several bodies that touch, nearly touch or run into each other, faces hidden inside them too, as in many CAD files."""
+    """Several bodies that touch, nearly touch or run into each other, faces hidden inside too, as in many CAD files."""
     parts = [_single(rng)]
     for _ in range(rng.integers(1, 5)):
         body, base = _single(rng), parts[0].vertices

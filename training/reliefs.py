@@ -1,7 +1,7 @@
 """Reliefs to train on: free-form surfaces with steps, ridges and grooves that are rounded more or less.
 
-What counts as an edge on a free-form surface is a line along which it bends far more than around it. Where it is rounded
-over several spacings no single row of points is the edge, so a band is.
+What counts as an edge on a free-form surface is a line along which it bends far more than around it. Where it is
+rounded over several spacings no single row of points is the edge, so a band is.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ class _Curve:
         self.sharp = (turn > LEAST_TURN) & (turn / (2 * max(self.round, 0.5)) > SALIENT * bend)
 
     def carve(self, plane: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Height (N,) that the profile adds; which points are edge, which neither, and which are near, (N,) bool each."""
+        """Height (N,) that the profile adds; which points are edge, which neither, and which near, (N,) bool each."""
         away = self._distance(plane)
         height = np.zeros(len(plane))
         edge, between = np.zeros(len(plane), bool), np.zeros(len(plane), bool)

@@ -3,10 +3,10 @@
 Run: python training/train.py [--scenes 2000] (15 minutes on two cores; evidence is kept in training/cache). Needs
 `pip install edgel[train]`. Nothing of the benchmark and no real data is seen in training: see `examples.example`.
 
-The trees of both screenings, by leaves of the index and by points, say where an edge could be; the others learn from what
-they let through. The first trees classify each point by its own evidence. What the second ones hear of the neighbours'
-probabilities has to be what the first say of scenes they were not trained on: each half of the scenes is classified by
-trees trained on the other half.
+The trees of both screenings, by leaves of the index and by points, say where an edge could be; the others learn from
+what they let through. The first trees classify each point by its own evidence. What the second ones hear of the
+neighbours' probabilities has to be what the first say of scenes they were not trained on: each half of the scenes is
+classified by trees trained on the other half.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from examples import example
 import edgel._surface
 from edgel import metrics
 from edgel._surface import features
-from edgel._surface.evidence import Evidence
 from edgel._surface.classify import SECOND as LIKELY
+from edgel._surface.evidence import Evidence
 from edgel._surface.forest import Forest, evaluate, read_forests, write_forests
 from edgel._surface.screen import POINT as SCREENED
 from edgel._surface.training import add_context, screen_cloud, screening_features
@@ -229,7 +229,7 @@ def own_evidence(seed: int) -> Table:
 
 
 def evidence_in_context(job: tuple[int, dict[str, Forest]]) -> Table:
-    """What the second trees learn from a scene: its evidence, and what trees that have not seen it say of neighbours."""
+    """What the second trees learn from a scene: its evidence, and what trees that never saw it say of neighbours."""
     seed, trees = job
     with np.load(CACHE / f"{seed}.npz") as file:
         stored = dict(file)
