@@ -1,0 +1,74 @@
+"""What training takes from a cloud is what detection computes of it, and a seed decides its examples."""
+
+import numpy as np
+import pytest
+from examples import example
+
+from edgel._neighbors.kdtree import build_index
+from edgel._surface import classify, cloud_statistics, screen
+from edgel._surface.features import LEAF, NUM_EVIDENCE, NUM_SCREEN, POINT
+from edgel._surface.forest import evaluate, load_forests
+from edgel._surface.training import add_context, screen_cloud, screening_features
+
+
+@pytest.fixture(scope="module", params=[0, 1, 13])  # a whole surface, a view, a relief
+def made(request):
+    return example(request.param)
+
+
+def test_an_example_says_of_each_point_what_it_is(made):
+    assert made.xyz.shape == (len(made.labels), 3)
+    assert np.isfinite(made.xyz).all()
+    assert made.labels.shape == (len(made.counts), 2)
+    assert 0 < made.labels.any(axis=1).mean() < 0.5
+    assert made.counts.mean() > 0.5
+    assert made.spacing > 0
+
+
+def test_the_seed_decides():
+    one, same, other = (example(seed) for seed in (3, 3, 4))
+    assert one.xyz.tobytes() == same.xyz.tobytes()
+    assert one.labels.tobytes() == same.labels.tobytes()
+    assert not np.array_equal(one.xyz, other.xyz)
+
+
+def test_screening_features_are_in_the_layouts(made):
+    asked = np.random.default_rng(0).random(len(made.xyz)) < 0.1
+    found = screening_features(made.xyz, asked)
+    assert found.features.shape == (asked.sum(), NUM_SCREEN)
+    assert np.array_equal(np.sort(found.points), np.flatnonzero(asked))
+    assert found.leaves.shape == (found.leaf.max() + 1, len(LEAF))
+    statistics = cloud_statistics(build_index(made.xyz)).values
+    for rows, layout in ((found.features, POINT), (found.leaves, LEAF)):
+        np.testing.assert_array_equal(rows[:, layout.block("cloud")], np.broadcast_to(statistics, (len(rows), 8)))
+    np.testing.assert_array_equal(np.bincount(found.leaf), found.leaves[:, LEAF.column("leaf.count")])
+
+
+def test_the_screening_is_that_of_detection(made):
+    forests = load_forests()
+    index = build_index(made.xyz)
+    wanted = screen(index, cloud_statistics(index)).probability
+    np.testing.assert_array_equal(screen_cloud(made.xyz, forests).probability[index.order], wanted)
+    # Where the leaves let a point through, the forest says of its features what the screening says.
+    found = screening_features(made.xyz, np.ones(len(made.xyz), bool))
+    let_through = wanted > 0
+    said = evaluate(forests["screen"], found.features[let_through])
+    np.testing.assert_allclose(said, wanted[let_through], atol=1e-6)
+
+
+def test_evidence_and_context_are_those_of_detection(made):
+    forests = load_forests()
+    index = build_index(made.xyz)
+    screening = screen(index, cloud_statistics(index))
+    wanted = classify(index, screening)
+    asked = np.zeros(len(made.xyz), bool)
+    asked[wanted.points] = True
+    points, evidence = screen_cloud(made.xyz, forests).gather_evidence(asked)
+    assert evidence.features.shape == (len(points), NUM_EVIDENCE)
+    crease, outline = (evaluate(forests[f"first {kind}"], evidence.features) for kind in ("crease", "outline"))
+    rows = add_context(made.xyz, points, evidence, crease, outline)
+    assert rows.shape == (len(points), len(POINT))
+    order = np.argsort(points)
+    np.testing.assert_array_equal(points[order], wanted.points)
+    np.testing.assert_array_equal(evaluate(forests["crease"], rows)[order], wanted.crease)
+    np.testing.assert_array_equal(evaluate(forests["outline"], rows)[order], wanted.outline)
