@@ -15,10 +15,7 @@ from edgel._demo.tables import REACH, count_table, findings, normals_table, offs
 from edgel._demo.truth import found_lengths, offsets
 from edgel._detect import detect
 from edgel._report import Case, Table, make_directory, write_report
-from edgel.cloud import Cloud
 from edgel.io import write
-
-_STEP = 0.25  # between the samples of a part's surface, mm
 
 __all__ = ["Demo", "Measurement", "Times", "run_demo", "side_by_side"]
 
@@ -87,7 +84,7 @@ def run_demo(
     paper.detect(scans[0].cloud, num_neighbors=NUM_NEIGHBORS)  # so that the report's times hold no compilation
     found = [paper.detect(scan.cloud, num_neighbors=NUM_NEIGHBORS) for scan in scans]
     times = measure_times(scans, found, repeats, tell)
-    tell("comparing with the other method")
+    tell("comparing with the default preset")
     others = [detect(scan.cloud) for scan in scans]
     tell("comparing with the truth")
     measurements = tuple(
@@ -101,7 +98,7 @@ def run_demo(
     tell("drawing")
     plot.save(folder / "edges.png", side_by_side(measurements))
     cases = [
-        Case(one.name, one.scan.cloud, one.edges, part=_surface(one.scan.part), other=other)
+        Case(one.name, one.scan.cloud, one.edges, one.scan.part, other=other)
         for one, other in zip(measurements, others, strict=True)
     ]
     page = write_report(cases, folder, title="Edges of a tee and an elbow", findings=said, tables=tables)
@@ -120,19 +117,12 @@ def side_by_side(measurements: Sequence[Measurement], *, width: int = 1600) -> n
     left = 0
     for one, extent in zip(measurements, extents, strict=True):
         size = int(extent[0] * scale) + 2 * rim, height
-        part = *one.scan.part.bounds.mean(axis=0), 0.0
-        look = {"direction": "top", "size": size, "detail": (part, size[0] / scale), "legend": False}
+        xyz = one.scan.cloud.xyz
+        middle = (np.nanmin(xyz, axis=0) + np.nanmax(xyz, axis=0)) / 2
+        look = {"direction": "top", "size": size, "detail": (middle, size[0] / scale), "legend": False}
         canvas[:, left : left + size[0]] = plot.picture(one.scan.cloud, one.edges, **look)
         left += size[0] + gap
     return canvas
-
-
-def _surface(part: synth.Part) -> Cloud:
-    """The surface of a part, closely sampled from above."""
-    low, high = part.bounds
-    x, y = np.meshgrid(np.arange(low[0], high[0], _STEP), np.arange(low[1], high[1], _STEP))
-    seen = np.dstack([x, y, part.height(x, y)])
-    return Cloud(seen[np.isfinite(seen[..., 2])])
 
 
 def _write_clouds(folder: Path, one: Measurement) -> list[Path]:

@@ -33,7 +33,7 @@ class Case:
     edges : Edges
         Of this cloud.
     part : Cloud or None
-        Dense points of the whole surface that it was scanned from, when it is simulated.
+        Evenly sampled points, dense and without noise, of the surface that it was scanned from, when it is simulated.
     tables : sequence of Table
         Comparison numbers of this cloud, shown below its own.
     other : Edges or None

@@ -25,7 +25,8 @@ def draw_figures(
     name : str
         What the captions call it.
     part : Cloud, optional
-        Dense points of the whole surface that a simulated cloud was scanned from, for figure 1 (a).
+        Evenly sampled points, dense and without noise, of the surface that a simulated cloud was scanned from, for
+        figure 1 (a).
     other : Edges, optional
         What another method finds in this cloud, for figure 9.
 

@@ -28,7 +28,7 @@ def figure_1(cloud: Cloud, edges: Edges, name: str, part: Cloud | None) -> Conte
         words.append("the point cloud")
     else:
         panels.append(Panel(Drawing(part, None, viewport, legend=False).on, "the part"))
-        words.append("the part, from all sides and without noise")
+        words.append("the part: the surface that the scanner faces, without noise")
         few = _thinned(cloud)
         singly = replace(viewport, point_size=_POINT)
         panels.append(Panel(Drawing(few, None, singly, legend=False).on, "the cloud"))
