@@ -138,18 +138,20 @@ class Drawing:
         if edges is not None and edges.num_points != len(cloud):
             raise ValueError(f"edges: found in a cloud of {edges.num_points:,} points, this one has {len(cloud):,}")
         viewport.check()
-        self._shading = Shading(cloud, color_by)
-        self._singly = viewport.point_size is not None
-        self._edge_colors, entries = _edge_colors(edges, edge_color)
-        entries += [Entry.arrow("normals")] * (normals and edges is not None)
-        self._legend = Legend(entries + self._shading.entries, viewport.size) if legend else None
         self._width, height = viewport.size
-        viewport = replace(viewport, size=(self._width, height - (self._legend.height if self._legend else 0)))
-        if normals:
+        self._singly = viewport.point_size is not None
+        self._shading = Shading(cloud, color_by)
+        self._edge_colors, entries = _edge_colors(edges, edge_color)
+        pointed = edges if normals else None
+        if pointed is not None:
+            entries.append(Entry.arrow("normals"))
             viewport = replace(viewport, margin=LONGEST)
-        self.buffer = ZBuffer(cloud, viewport)
+        self._legend = Legend(entries + self._shading.entries, viewport.size) if legend else None
+        if self._legend is not None:
+            height -= self._legend.height
+        self.buffer = ZBuffer(cloud, replace(viewport, size=(self._width, height)))
         self._shown = None if edges is None else self.buffer.overlay(edges.index)
-        self._arrows = Arrows(self.buffer, edges) if normals and edges is not None else None
+        self._arrows = None if pointed is None else Arrows(self.buffer, pointed)
 
     def on(self, background: str) -> np.ndarray:
         """Draw it on a ``"light"`` or a ``"dark"`` background, (height, width, 3) uint8."""
