@@ -24,9 +24,7 @@ from edgel._demo.tables import (
 from edgel._demo.truth import found_lengths, offsets
 from edgel._detect import detect
 from edgel._report import Case, Table, make_directory, write_report
-from edgel.cloud import Cloud
 from edgel.io import write
-from edgel.synth import Solid
 
 __all__ = ["Demo", "Measurement", "Times", "run_demo", "side_by_side"]
 
@@ -120,7 +118,7 @@ def run_demo(
     tell("drawing")
     plot.save(folder / "edges.png", side_by_side(measurements))
     cases = [
-        Case(one.name, one.scan.cloud, one.edges, _surface(one.solid), other=other)
+        Case(one.name, one.scan.cloud, one.edges, synth.sample(one.solid, spacing=_DRAWN).cloud, other=other)
         for one, other in zip(measurements, others, strict=True)
     ]
     page = write_report(cases, folder, title="Edges of a tee and an elbow", findings=said, tables=tables)
@@ -139,18 +137,12 @@ def side_by_side(measurements: Sequence[Measurement], *, width: int = 1600) -> n
     left = 0
     for one, extent in zip(measurements, extents, strict=True):
         size = int(extent[0] * scale) + 2 * rim, height
-        rows = one.edges.index
-        picture = plot.render(one.scan.cloud, rows_on_top=rows, direction="top", size=size, margin=rim / min(size))
-        canvas[:, left : left + size[0]] = picture
+        xyz = one.scan.cloud.xyz
+        middle = (np.nanmin(xyz, axis=0) + np.nanmax(xyz, axis=0)) / 2
+        look = {"direction": "top", "size": size, "detail": (middle, size[0] / scale), "legend": False}
+        canvas[:, left : left + size[0]] = plot.picture(one.scan.cloud, one.edges, **look)
         left += size[0] + gap
     return canvas
-
-
-def _surface(solid: Solid) -> Cloud:
-    """Points on the surface of a part, close enough to be drawn as one."""
-    scene = synth.sample(solid, spacing=_DRAWN)
-    nx, ny, nz = scene.normals.T
-    return scene.cloud.with_attributes(nx=nx, ny=ny, nz=nz)
 
 
 def _write_clouds(folder: Path, one: Measurement) -> list[Path]:

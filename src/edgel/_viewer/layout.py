@@ -13,12 +13,13 @@ import numpy as np
 
 from edgel._viewer.source import Source, reach
 from edgel.cloud import in_box
+from edgel.plot.camera import OBLIQUE
 
 FIELD_OF_VIEW = 0.7  # of the page's camera, vertical, radians
 _MARGIN = 1.05  # of the distance to the target
 _GAP = 0.15  # between neighbours, scene units
 _LEVEL = np.array([0.0, 1.0, 0.0])
-_OBLIQUE = np.array([-0.45, 0.65, -0.62]) / np.linalg.norm([-0.45, 0.65, -0.62])
+_OBLIQUE = np.array(OBLIQUE) / np.linalg.norm(OBLIQUE)
 _SAME_SCALE = 10.0  # clouds that differ more in size are each made to fit
 
 
