@@ -8,13 +8,13 @@ import pytest
 
 import edgel
 from edgel._color import color_channels, color_edges
-from edgel._color.chains import thin
+from edgel._color.chains import non_maximum_suppression
 from edgel._color.gradient import color_gradient
 from edgel._color.step import _peak
-from edgel._neighbors.candidates import every_place, every_point
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.normals import fit_planes
+from edgel._neighbors.queries import every_place, every_point
 from edgel.cloud import Cloud, check_points
 
 
@@ -119,7 +119,7 @@ def test_thinning_is_that_of_the_oracle():
     # Few abreast of each: the kernel looks at no more than twelve neighbours.
     points = np.c_[np.arange(300) * 0.6, rng.uniform(-0.75, 0.75, 300), rng.normal(0, 0.05, 300)]
     across = np.tile([0.0, 1.0, 0.0], (300, 1))
-    kept = thin(points, across, np.ones(300), -points[:, 1])
+    kept = non_maximum_suppression(points, across, np.ones(300), -points[:, 1])
     assert sorted(np.flatnonzero(kept)) == sorted(naive.thin_abreast(points, across, np.ones(300), -points[:, 1]))
     assert 100 < kept.sum() < 300
 

@@ -6,9 +6,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial import KDTree
 
-from edgel._neighbors.candidates import at_places, at_points, every_place, every_point
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import knn
+from edgel._neighbors.queries import at_places, at_points, every_place, every_point
 
 # Few different coordinates, so that ties and duplicates are the rule.
 LATTICE = arrays(np.float64, st.tuples(st.integers(1, 60), st.just(3)), elements=st.integers(-3, 3).map(float))

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from edgel._neighbors.candidates import at_places, every_point
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import knn
 from edgel._neighbors.normals import fit_planes, fit_planes_within
+from edgel._neighbors.queries import at_places, every_point
 
 SEEDS = st.integers(0, 2**32 - 1)
 

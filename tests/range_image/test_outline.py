@@ -4,7 +4,7 @@ import naive
 import numpy as np
 import pytest
 
-from edgel._range_image.facets import _held, local_planes, noise_level
+from edgel._range_image.facets import _without_isolated, local_planes, noise_level
 from edgel._range_image.outline import Outline, beside_void, level_gaps, outlines
 from edgel._range_image.range_image import RangeImage, organized, orthographic
 from edgel.edges import EdgeKind
@@ -147,7 +147,7 @@ def test_kernels_equal_naive():
     depth[RNG.random(depth.shape) < 0.1] = np.nan
     close = np.full(depth.shape, 1.5)
     kept = np.full(depth.shape, np.nan)
-    _held(0, len(depth), depth, close, kept)
+    _without_isolated(0, len(depth), depth, close, kept)
     assert np.array_equal(kept, naive.held(depth, close), equal_nan=True)
     known = np.flatnonzero(~np.isnan(depth))
     planes = local_planes(depth, np.full(depth.shape, 0.2), known, False, 3)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from edgel._kernels.simd import LANES
-from edgel._neighbors.candidates import anywhere
 from edgel._neighbors.kdtree import build_index, leaf_starts
 from edgel._neighbors.knn import visit_neighbors
+from edgel._neighbors.queries import anywhere
 from edgel._surface import context, hinge, leaves, minimal_planes, plane_scales, sectors, two_planes
 from edgel._surface.evidence import MAX_AWAY, MIN_TURN, _best_fit, gather_evidence
 from edgel._surface.features import NUM_EVIDENCE, POINT
@@ -249,7 +249,7 @@ def test_every_column_holds_what_its_name_says():
     places = np.flatnonzero(np.abs(index.xyz[0]) < 1)[::7]
     evidence = gather_evidence(index, screening, places)
     assert evidence.placed.sum() > 3
-    statistics = dict(zip(FEATURES_OF_CLOUD, screening.statistics.values, strict=True))
+    statistics = dict(zip(FEATURES_OF_CLOUD, screening.statistics, strict=True))
     for row, fit, place in zip(evidence.features, evidence.fit.astype(float), places, strict=True):
         near = naive.nearest(points.tolist(), index.at(np.array([place]))[0].tolist(), 96)
         vectors = points[near] - points[near[0]]

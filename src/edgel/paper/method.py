@@ -13,9 +13,9 @@ from typing import Any, Self
 
 import numpy as np
 
-from edgel._neighbors.candidates import at_points
 from edgel._neighbors.kdtree import bounds, build_index
 from edgel._neighbors.normals import Normals, by_offset, check_num_neighbors, fit_planes_within, no_planes
+from edgel._neighbors.queries import at_points
 from edgel._neighbors.spacing import occupied_spacing
 from edgel._stages import Stages
 from edgel.cloud import check_points
