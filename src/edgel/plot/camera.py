@@ -11,7 +11,7 @@ from edgel.cloud import Cloud, as_vector
 
 DIRECTIONS = ("auto", "top", "oblique", "sensor")
 
-_OBLIQUE = (
+OBLIQUE = (
     -0.45,
     0.65,
     -0.62,
@@ -104,13 +104,13 @@ def choose_camera(cloud: Cloud, direction: Any) -> Camera:
     if direction == "top":
         return _looking(np.array([0.0, 0.0, -1.0]))
     if direction == "oblique":
-        return _looking(np.array(_OBLIQUE))
+        return _looking(np.array(OBLIQUE))
     if direction == "sensor" and cloud.viewpoint is None:
         raise ValueError("direction: this cloud does not know its viewpoint; give one, or look from 'oblique'")
     camera = _from_sensor(cloud)
     if camera is None and direction == "sensor":
         raise ValueError("direction: the cloud lies all round its viewpoint; look from 'top' or 'oblique'")
-    return camera or _looking(np.array(_OBLIQUE))
+    return camera or _looking(np.array(OBLIQUE))
 
 
 def choose_frame(placed: np.ndarray, size: tuple[int, int], *, margin: float, crop: bool) -> Frame:
