@@ -96,7 +96,7 @@ def test_slider_on_a_large_cloud(browser, folder, errors):
     from edgel._viewer.server import running
 
     path = folder / "large.ply"
-    edgel.write(path, synth.scan(synth.tee()).cloud)
+    edgel.write(path, synth.scan(synth.tee(), num_points=647_984).cloud)
     with running([str(path)]) as viewer:
         page = open_tab(browser, viewer.url, errors)
         assert "647,984 points" in page.locator(".edgel-status").inner_text()

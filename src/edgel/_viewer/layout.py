@@ -19,6 +19,7 @@ FIELD_OF_VIEW = 0.7  # of the page's camera, vertical, radians
 _MARGIN = 1.05  # of the distance to the target
 _GAP = 0.15  # between neighbours, scene units
 _LEVEL = np.array([0.0, 1.0, 0.0])
+_OBLIQUE = np.array(OBLIQUE) / np.linalg.norm(OBLIQUE)
 _SAME_SCALE = 10.0  # clouds that differ more in size are each made to fit
 
 
@@ -110,8 +111,7 @@ def lay_out(sources: Sequence[Source]) -> Layout:
     sizes = [one.size for one in upright]
     same_scale = max(sizes) <= _SAME_SCALE * min(sizes)
     units = [1 / (max(sizes) if same_scale else size) for size in sizes]
-    away = _LEVEL if all(source.camera.eye is not None for source in sources) else np.array(OBLIQUE)
-    away = away / np.linalg.norm(away)
+    away = _LEVEL if all(source.camera.eye is not None for source in sources) else _OBLIQUE
     right = np.cross(away, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
     widths = [2 * float(np.abs(right) @ one.half) * unit for one, unit in zip(upright, units, strict=True)]

@@ -10,12 +10,9 @@ import numpy as np
 from edgel.cloud import Cloud, as_vector
 
 DIRECTIONS = ("auto", "top", "oblique", "sensor")
+OBLIQUE = (-0.45, 0.65, -0.62)
+"""The oblique view, away from the viewer: from the front, a little from the right, down 38 degrees."""
 
-OBLIQUE = (
-    -0.45,
-    0.65,
-    -0.62,
-)  # looking away from the viewer: from the front, a little from the right, down 38 degrees
 _CONE = 0.2  # least cosine to the mean direction in which a sensor sees 98 % of what it sees: a camera, no sweep
 _TAIL = 0.5  # percent of the points at either end that may lie outside the frame
 _SLACK = 0.2  # what a frame by percentiles is widened by; a cloud without outliers then fits in whole
