@@ -2,7 +2,7 @@
 
 import numpy as np
 
-TIMEOUT = 60.0
+TIMEOUT = 180.0  # seconds: the first detection compiles the kernels
 PER_POINT = ("index", "kind", "strength", "position", "direction", "normals", "angle", "convex")
 
 
