@@ -10,12 +10,9 @@ import numpy as np
 from edgel.cloud import Cloud, as_vector
 
 DIRECTIONS = ("auto", "top", "oblique", "sensor")
+OBLIQUE = (-0.45, 0.65, -0.62)
+"""The oblique view, away from the viewer: from the front, a little from the right, down 38 degrees."""
 
-_OBLIQUE = (
-    -0.45,
-    0.65,
-    -0.62,
-)  # looking away from the viewer: from the front, a little from the right, down 38 degrees
 _CONE = 0.2  # least cosine to the mean direction in which a sensor sees 98 % of what it sees: a camera, no sweep
 _TAIL = 0.5  # percent of the points at either end that may lie outside the frame
 _SLACK = 0.2  # what a frame by percentiles is widened by; a cloud without outliers then fits in whole
@@ -104,13 +101,13 @@ def choose_camera(cloud: Cloud, direction: Any) -> Camera:
     if direction == "top":
         return _looking(np.array([0.0, 0.0, -1.0]))
     if direction == "oblique":
-        return _looking(np.array(_OBLIQUE))
+        return _looking(np.array(OBLIQUE))
     if direction == "sensor" and cloud.viewpoint is None:
         raise ValueError("direction: this cloud does not know its viewpoint; give one, or look from 'oblique'")
     camera = _from_sensor(cloud)
     if camera is None and direction == "sensor":
         raise ValueError("direction: the cloud lies all round its viewpoint; look from 'top' or 'oblique'")
-    return camera or _looking(np.array(_OBLIQUE))
+    return camera or _looking(np.array(OBLIQUE))
 
 
 def choose_frame(placed: np.ndarray, size: tuple[int, int], *, margin: float, crop: bool) -> Frame:
