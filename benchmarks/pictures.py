@@ -17,7 +17,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 from rivals import RIVALS
 
-from edgel import plot
+from edgel import EdgeKind, Edges, plot
+from edgel.edges import one_face
 from edgel.synth import Scene
 
 DOCS = Path(__file__).parent.parent / "docs" / "benchmarks"
@@ -36,13 +37,31 @@ def answers(scene: Scene, tuned: dict[str, dict[str, dict]]) -> list[tuple[str, 
     return found
 
 
+def as_edges(scene: Scene, mask: np.ndarray) -> Edges:
+    """Edges of one kind and without normals, as most rivals find no more."""
+    index = np.flatnonzero(mask)
+    return Edges(
+        index=index,
+        kind=np.full(len(index), EdgeKind.CREASE, np.uint8),
+        strength=np.ones(len(index)),
+        position=scene.cloud.xyz[index],
+        **one_face(np.full((len(index), 3), np.nan)),
+        num_points=len(scene.cloud),
+        num_dropped=0,
+        method="",
+        reason="",
+        parameters={},
+        seconds={},
+    )
+
+
 def draw(scene: Scene, panels: list[tuple[str, np.ndarray]], path: Path) -> None:
     columns = 4
     lines = -(-len(panels) // columns)
     figure = Figure(figsize=(4 * columns, 3.3 * lines), layout="constrained")
     for place, (title, mask) in enumerate(panels, start=1):
         axes = figure.add_subplot(lines, columns, place, title=f"{title}: {np.count_nonzero(mask):,}")
-        axes.imshow(plot.render(scene.cloud, rows_on_top=np.flatnonzero(mask), size=PANEL))
+        axes.imshow(plot.picture(scene.cloud, as_edges(scene, mask), size=PANEL, legend=False))
         axes.axis("off")
     figure.suptitle(f"{scene.name}: {np.isfinite(scene.cloud.xyz[:, 0]).sum():,} points")
     buffer = io.BytesIO()

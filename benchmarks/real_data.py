@@ -1,4 +1,4 @@
-"""Run both presets on every cloud of the shared data and write docs/real-data.md with a picture each.
+"""Run both methods on every cloud of the shared data and write docs/real-data.md with a picture each.
 
 Run: python benchmarks/real_data.py [DATA] (default ../shared/data). Remarks on each file are kept in REMARKS below: they
 are what a person saw in the pictures, and are checked by looking again.
@@ -6,6 +6,8 @@ are what a person saw in the pictures, and are checked by looking again.
 
 import sys
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -51,11 +53,11 @@ REMARKS = {
 
 INTRO = """# Real data
 
-Every file of the development data that the formats cover, through `edgel detect` with both presets: `python
-benchmarks/real_data.py`. Left the paper preset, right the default; edge points in the color of their kind. Files of the same folder share one
+Every file of the development data that the formats cover, through `edgel detect` with both methods: `python
+benchmarks/real_data.py`. Left the paper's method, right the default; edge points in the color of their kind. Files of the same folder share one
 remark. Meshes (STL, OBJ, STEP) and the ROS recording are no clouds and are refused with a message that says so.
 
-The paper preset was measured on two dense scans of single parts ([decisions](decisions.md)). On sparse or cluttered clouds
+The paper's method was measured on two dense scans of single parts ([decisions](decisions.md)). On sparse or cluttered clouds
 its bands cover a large share of the whole, and where there are a thousand points its image is only 8 pixels wide.
 
 """
@@ -66,13 +68,27 @@ def clouds(data: Path) -> list[Path]:
     return [f for f in files if not SKIP & set(f.relative_to(data).parts) and f.suffix.lower() not in (".txt", ".csv")]
 
 
-def run(cloud: edgel.Cloud, preset: str) -> tuple[edgel.Edges | None, float, str]:
+@dataclass(frozen=True)
+class Run:
+    """What a method finds in a cloud, in how many seconds, or why it cannot look at it."""
+
+    edges: edgel.Edges | None
+    seconds: float
+    error: str = ""
+
+    def cells(self) -> list[str]:
+        if self.edges is None:
+            return [self.error, ""]
+        return [f"{len(self.edges):,} ({self.edges.share:.1%})", f"{self.seconds:.2f}"]
+
+
+def run(detect: Callable[[edgel.Cloud], edgel.Edges], cloud: edgel.Cloud) -> Run:
     start = time.perf_counter()
     try:
-        edges = edgel.detect(cloud, preset=preset)
+        edges = detect(cloud)
     except ValueError as error:
-        return None, 0.0, str(error)
-    return edges, time.perf_counter() - start, ""
+        return Run(None, 0.0, str(error))
+    return Run(edges, time.perf_counter() - start)
 
 
 def picture(cloud: edgel.Cloud, found: list[edgel.Edges | None], path: Path) -> None:
@@ -96,15 +112,12 @@ def main() -> None:
             print(name, error)
             table.append(f"| `{name}` | refused: {str(error).split(': ', 1)[1]} | | | | | |")
             continue
-        paper, paper_s, paper_error = run(cloud, "paper")
-        default, default_s, default_error = run(cloud, "default")
-        cells = [f"{len(cloud):,}"]
-        cells.append(f"{(paper or default).num_dropped:,}" if paper or default else "")
-        for edges, seconds, error in ((paper, paper_s, paper_error), (default, default_s, default_error)):
-            cells += [error, ""] if edges is None else [f"{len(edges):,} ({edges.share:.1%})", f"{seconds:.2f}"]
+        runs = run(edgel.paper.detect, cloud), run(edgel.detect, cloud)
+        dropped = int((~np.isfinite(cloud.xyz).all(axis=1)).sum())
+        cells = [f"{len(cloud):,}", f"{dropped:,}", *runs[0].cells(), *runs[1].cells()]
         table.append(f"| `{name}` | " + " | ".join(cells) + " |")
         image = DOCS / "real-data" / (name.replace("/", "_") + ".png")
-        picture(cloud, [paper, default], image)
+        picture(cloud, [one.edges for one in runs], image)
         if name.split("/")[0] != folder:
             folder = name.split("/")[0]
             pages.append(f"## {folder}\n\n{REMARKS.get(folder, '')}\n")

@@ -11,7 +11,8 @@ import pytest
 from PIL import Image
 
 import edgel
-from edgel import EdgeKind, palette
+from edgel import EdgeKind
+from edgel.plot import palette
 
 
 @pytest.fixture(scope="module")

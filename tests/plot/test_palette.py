@@ -5,7 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from edgel import EdgeKind, palette
+from edgel import EdgeKind
+from edgel.plot import palette
 
 # What is left of linear RGB without one kind of cone: Machado, Oliveira, Fernandes 2009, severity 1.
 VISION = {

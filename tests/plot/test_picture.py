@@ -1,47 +1,16 @@
 """The picture of a cloud and its edges: colors that mean what the legend says, a bar that measures, any order."""
 
 from dataclasses import replace
-from typing import Any
 
-import naive
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from PIL import Image
-from typer.testing import CliRunner
+from by_hand import edges_at, grid
 
-import edgel
-from edgel import Cloud, EdgeKind, Edges, palette, plot, scene, surface
-from edgel._cli import app
-from edgel.edges import one_face
+from edgel import Cloud, EdgeKind, plot
+from edgel.plot import palette
 from edgel.plot.legend import round_length
 
 SIZE = (480, 360)
-
-
-def grid(columns=60, rows=40, step=1.0):
-    """Points (N, 3) of a level grid, x from 0 to columns - step, y from 0 to rows - step, row by row."""
-    x, y = np.meshgrid(np.arange(0, columns, step), np.arange(0, rows, step))
-    return np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
-
-
-def by_hand(cloud, rows, kind: Any = EdgeKind.CREASE, strength: Any = 1.0):
-    rows = np.flatnonzero(rows) if np.asarray(rows).dtype == bool else np.asarray(rows, np.int64)
-    return Edges(
-        index=rows,
-        kind=np.broadcast_to(np.asarray(kind, np.uint8), len(rows)),
-        strength=np.broadcast_to(np.asarray(strength, float), len(rows)),
-        position=cloud.xyz[rows],
-        **one_face(np.tile([0.0, 0.0, 1.0], (len(rows), 1))),
-        num_points=len(cloud),
-        num_dropped=0,
-        preset="default",
-        method="surface",
-        reason="",
-        parameters={},
-        seconds={},
-    )
 
 
 def where(picture, color):
@@ -49,7 +18,7 @@ def where(picture, color):
     return (picture == np.array(color, np.uint8)).all(axis=2)
 
 
-def strip(picture):
+def legend(picture):
     """What stands below the cloud: the lines under the last row that is empty from side to side, from below."""
     inked = (picture != picture[0, 0]).any(axis=(1, 2))
     line = np.flatnonzero(inked)[-1]
@@ -59,26 +28,26 @@ def strip(picture):
 
 
 def bar_length(picture):
-    """Pixels of the longest run of ink in the strip."""
-    ink = (np.abs(strip(picture).astype(int) - picture[0, 0]).min(axis=2) > 200).astype(int)
+    """Pixels of the longest run of ink in the legend."""
+    ink = (np.abs(legend(picture).astype(int) - picture[0, 0]).min(axis=2) > 200).astype(int)
     return max(np.diff(np.flatnonzero(np.diff(np.r_[0, line, 0])))[::2].max(initial=0) for line in ink)
 
 
-@pytest.mark.parametrize("background", surface.SHEETS)
+@pytest.mark.parametrize("background", palette.THEMES)
 def test_the_legend_names_the_kinds_that_are_there_and_no_other(background):
     cloud = Cloud(grid())
     kinds = np.repeat([EdgeKind.BOUNDARY, EdgeKind.CREASE, EdgeKind.COLOR | EdgeKind.CREASE], 40)
-    edges = by_hand(cloud, np.arange(120), kinds)
-    below = strip(plot.picture(cloud, edges, direction="top", size=(1000, 750), background=background))
+    edges = edges_at(cloud, np.arange(120), kinds)
+    below = legend(plot.picture(cloud, edges, direction="top", size=(1000, 750), background=background))
     named = [kind for kind, color in palette.KIND_COLORS.items() if where(below, color).any()]
     assert named == [EdgeKind.BOUNDARY, EdgeKind.CREASE, EdgeKind.COLOR]
-    assert below[-1, -1].tolist() == list(surface.SHEETS[background].paper)
+    assert below[-1, -1].tolist() == list(palette.THEMES[background].background)
 
 
 def test_edge_points_wear_the_colors_of_their_kinds():
     cloud = Cloud(grid())
     for kind, color in palette.KIND_COLORS.items():
-        edges = by_hand(cloud, cloud.xyz[:, 0] >= 50, kind)
+        edges = edges_at(cloud, cloud.xyz[:, 0] >= 50, kind)
         picture = plot.picture(cloud, edges, direction="top", size=SIZE, legend=False)
         at = np.nonzero(where(picture, color))[1]
         assert at.min() > 480 * 0.75
@@ -88,7 +57,7 @@ def test_edge_points_wear_the_colors_of_their_kinds():
 def test_the_stronger_the_darker():
     cloud = Cloud(grid())
     rows = np.flatnonzero((cloud.xyz[:, 0] < 10) | (cloud.xyz[:, 0] >= 50))
-    edges = by_hand(cloud, rows, strength=np.where(cloud.xyz[rows, 0] < 10, 0.5, 0.9))
+    edges = edges_at(cloud, rows, strength=np.where(cloud.xyz[rows, 0] < 10, 0.5, 0.9))
     picture = plot.picture(cloud, edges, direction="top", size=SIZE, edge_color="strength", legend=False)
     weak, strong = palette.ramp_colors([1.0, 0.0])
     assert np.nonzero(where(picture, weak))[1].max() < 120
@@ -99,9 +68,9 @@ def test_the_stronger_the_darker():
 @pytest.mark.parametrize("size", [(480, 360), (1000, 400)])
 def test_the_scale_bar_is_as_long_as_it_says(scale, size):
     cloud = Cloud(grid() * scale)
-    marks = by_hand(cloud, np.flatnonzero(cloud.xyz[:, 1] == 0)[[10, 50]])
+    marks = edges_at(cloud, np.flatnonzero(cloud.xyz[:, 1] == 0)[[10, 50]])
     picture = plot.picture(cloud, marks, direction="top", size=size)
-    above = picture[: len(picture) - len(strip(picture))]
+    above = picture[: len(picture) - len(legend(picture))]
     columns = np.nonzero(np.abs(above.astype(int) - palette.ANY_KIND).sum(axis=2) < 30)[1]
     middle = (columns.min() + columns.max()) / 2
     left, right = (columns[columns < middle].mean(), columns[columns > middle].mean())
@@ -114,7 +83,7 @@ def test_in_perspective_the_bar_holds_at_the_middle_distance():
     v, u = np.mgrid[0:90, 0:120]
     plane = np.dstack([(u - 59.5) / 120 * 5, (v - 44.5) / 120 * 5, np.full(u.shape, 5.0)])
     cloud = Cloud(plane, viewpoint=np.zeros(3))
-    marks = by_hand(cloud, [45 * 120 + 20, 45 * 120 + 100])
+    marks = edges_at(cloud, [45 * 120 + 20, 45 * 120 + 100])
     picture = plot.picture(cloud, marks, size=SIZE)
     columns = np.nonzero(np.abs(picture[:250].astype(int) - palette.ANY_KIND).sum(axis=2) < 30)[1]
     pixels_a_unit = (columns[columns > 240].mean() - columns[columns < 240].mean()) / (80 / 120 * 5)
@@ -132,7 +101,7 @@ def test_the_order_of_the_points_does_not_matter(direction):
     # A level grid: from the top all points are equally near, and every disc overlaps its neighbours.
     cloud = Cloud(grid(), dict(zip(("red", "green", "blue"), rng.integers(0, 256, (3, 2400), np.uint8), strict=True)))
     rows = np.sort(rng.choice(2400, 300, replace=False))
-    edges = by_hand(cloud, rows, rng.choice(list(EdgeKind), 300))
+    edges = edges_at(cloud, rows, rng.choice(list(EdgeKind), 300))
     order = rng.permutation(2400)
     place = np.argsort(order)[rows]
     shuffled = replace(edges, index=np.sort(place), kind=edges.kind[np.argsort(place)])
@@ -145,27 +114,16 @@ def test_the_order_of_the_points_does_not_matter(direction):
 def test_edges_behind_a_surface_are_not_drawn():
     front = grid()
     cloud = Cloud(np.vstack([front, front - (0, 0, 30)]))
-    edges = by_hand(cloud, np.arange(2400, 4800))
+    edges = edges_at(cloud, np.arange(2400, 4800))
     color = palette.KIND_COLORS[EdgeKind.CREASE]
     options = {"size": SIZE, "legend": False}
     assert not where(plot.picture(cloud, edges, direction="top", **options), color).any()
     assert where(plot.picture(cloud, edges, direction=(0, 0, 1), **options), color).any()
 
 
-@given(
-    places=st.lists(st.tuples(*[st.integers(0, 12)] * 3), min_size=1, max_size=40),
-    radius=st.sampled_from([0.0, 0.5, 1.0, 1.6]),
-)
-def test_the_nearest_disc_shows(places, radius):
-    xyz = np.array(places, float)
-    laid = scene.Scene(xyz, direction="top", size=(16, 16), crop=False, margin=0.1, point_radius=radius)
-    wanted = naive.discs(laid.columns, laid.downs, laid.distance, laid.width, laid.height, laid.radius)
-    np.testing.assert_array_equal(laid.winner, wanted)
-
-
 def test_a_detail_shows_what_lies_around_a_place():
     cloud = Cloud(grid(step=0.25))
-    edges = by_hand(cloud, cloud.xyz[:, 0] == 30)
+    edges = edges_at(cloud, cloud.xyz[:, 0] == 30)
     picture = plot.picture(cloud, edges, direction="top", size=SIZE, legend=False, detail=((30, 20, 0), 20.0))
     columns = np.nonzero(where(picture, palette.ANY_KIND))[1]
     assert columns.mean() == pytest.approx(240, abs=2)
@@ -228,8 +186,8 @@ def test_normals_are_colors():
 def test_a_cloud_without_edges_has_a_scale_bar_and_nothing_to_name():
     cloud = Cloud(grid())
     alone = plot.picture(cloud, direction="top", size=SIZE)
-    np.testing.assert_array_equal(alone, plot.picture(cloud, by_hand(cloud, []), direction="top", size=SIZE))
-    assert plot.picture(cloud, by_hand(cloud, []), edge_color="strength", size=SIZE).shape == (360, 480, 3)
+    np.testing.assert_array_equal(alone, plot.picture(cloud, edges_at(cloud, []), direction="top", size=SIZE))
+    assert plot.picture(cloud, edges_at(cloud, []), edge_color="strength", size=SIZE).shape == (360, 480, 3)
     assert bar_length(alone) > 20
 
 
@@ -261,62 +219,4 @@ def test_bad_options_say_what_is_wrong(options, message):
 
 def test_edges_of_another_cloud():
     with pytest.raises(ValueError, match=r"found in a cloud of 2,400 points, this one has 100"):
-        plot.picture(grid(10, 10), by_hand(Cloud(grid()), [1]))
-
-
-def run(*words):
-    return CliRunner(env={"COLUMNS": "200"}).invoke(app, ["render", *map(str, words)])
-
-
-@pytest.fixture(scope="module")
-def roof(tmp_path_factory):
-    path = tmp_path_factory.mktemp("render") / "roof.ply"
-    xyz = grid(40, 40)
-    edgel.write(path, Cloud(xyz - np.column_stack([np.zeros((1600, 2)), np.abs(xyz[:, 0] - 20)])))
-    return path
-
-
-def test_render_draws_what_detect_finds(roof, tmp_path):
-    out = tmp_path / "roof.png"
-    result = run(
-        roof, "-o", out, "--kinds", "crease", "--size", "480x360", "--background", "dark", "--direction", "0,1,-1"
-    )
-    assert result.exit_code == 0, result.output
-    cloud = edgel.read(roof)
-    edges = edgel.detect(cloud, kinds="crease")
-    wanted = plot.picture(cloud, edges, size=SIZE, background="dark", direction=(0, 1, -1))
-    with Image.open(out) as image:
-        np.testing.assert_array_equal(np.asarray(image), wanted)
-    for words in ("crease", "drawing", f"{out}: the picture, 480 x 360 pixels"):
-        assert words in result.stderr
-
-
-def test_render_leaves_out_what_is_weak(roof, tmp_path):
-    strength = edgel.paper.detect(edgel.read(roof)).strength
-    least = float(np.median(strength))
-    result = run(roof, "-o", tmp_path / "out.png", "--preset", "paper", "--min-strength", least)
-    assert result.exit_code == 0
-    said = result.stderr.split("edge points")[1].split()[0]
-    assert int(said.replace(",", "")) == np.count_nonzero(strength >= least) < len(strength)
-
-
-@pytest.mark.parametrize(
-    ("words", "code"),
-    [
-        (["-o", "out.jpg"], 2),
-        (["-o", "none/out.png"], 5),
-        (["-o", "out.png", "--size", "big"], 2),
-        (["-o", "out.png", "--size", "20x20"], 2),
-        (["-o", "out.png", "--direction", "1,x,0"], 2),
-        (["-o", "out.png", "--direction", "left"], 2),
-        (["-o", "out.png", "--color-by", "rgb"], 2),
-        (["-o", "out.png", "--min-strength", "2"], 2),
-        (["-o", "out.png", "--kinds", "wood"], 2),
-    ],
-)
-def test_render_says_what_is_wrong(roof, tmp_path, monkeypatch, words, code):
-    monkeypatch.chdir(tmp_path)
-    result = run(roof, *words)
-    assert result.exit_code == code
-    assert words[-1].split("/")[0] in result.stderr or words[-2] in result.stderr
-    assert list(tmp_path.iterdir()) == []
+        plot.picture(grid(10, 10), edges_at(Cloud(grid()), [1]))

@@ -16,7 +16,8 @@ from edgel._stages import Stages
 from edgel.plot import picture, save
 from edgel.plot.camera import DIRECTIONS
 from edgel.plot.drawing import EDGE_COLORS
-from edgel.plot.surface import COLOR_BY, SHEETS
+from edgel.plot.palette import THEMES
+from edgel.plot.shading import COLOR_BY
 
 HELP = """Draw a cloud and its edges, without browser or graphics card.
 
@@ -57,7 +58,7 @@ def render(
     edge_color: Annotated[
         str, typer.Option(metavar="|".join(EDGE_COLORS), help="What the color of an edge point tells.")
     ] = options.default_of(picture, "edge_color"),
-    background: Annotated[str, typer.Option(metavar="|".join(SHEETS), help="What to draw on.")] = options.default_of(
+    background: Annotated[str, typer.Option(metavar="|".join(THEMES), help="What to draw on.")] = options.default_of(
         picture, "background"
     ),
     viewpoint: options.Viewpoint = None,

@@ -117,9 +117,10 @@ def side_by_side(measurements: Sequence[Measurement], *, width: int = 1600) -> n
     left = 0
     for one, extent in zip(measurements, extents, strict=True):
         size = int(extent[0] * scale) + 2 * rim, height
-        rows = one.edges.index
-        picture = plot.render(one.scan.cloud, rows_on_top=rows, direction="top", size=size, margin=rim / min(size))
-        canvas[:, left : left + size[0]] = picture
+        xyz = one.scan.cloud.xyz
+        middle = (np.nanmin(xyz, axis=0) + np.nanmax(xyz, axis=0)) / 2
+        look = {"direction": "top", "size": size, "detail": (middle, size[0] / scale), "legend": False}
+        canvas[:, left : left + size[0]] = plot.picture(one.scan.cloud, one.edges, **look)
         left += size[0] + gap
     return canvas
 

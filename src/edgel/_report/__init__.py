@@ -11,11 +11,10 @@ from pathlib import Path
 from edgel._report.figures import draw_figures
 from edgel._report.histograms import Histogram, angle_histogram, strength_histogram
 from edgel._report.page import opening, page, section
-from edgel._report.tables import Table, count_table, parameter_table, preset_table, time_table
+from edgel._report.tables import Table, count_table, method_table, parameter_table, time_table
 from edgel.cloud import Cloud
 from edgel.edges import Edges
 from edgel.io.files import replacing
-from edgel.synth import Part
 
 __all__ = ["Case", "Table", "make_directory", "write_report"]
 
@@ -33,12 +32,12 @@ class Case:
     cloud : Cloud
     edges : Edges
         Of this cloud.
-    part : Part or None
-        The part it was scanned from, when it is simulated.
+    part : Cloud or None
+        Evenly sampled points, dense and without noise, of the surface that it was scanned from, when it is simulated.
     tables : sequence of Table
         Comparison numbers of this cloud, shown below its own.
     other : Edges or None
-        What another preset finds in this cloud, to compare.
+        What another method finds in this cloud, to compare.
     files : mapping of str to path
         Files that belong to it, by what they hold; the page links to them.
     """
@@ -46,7 +45,7 @@ class Case:
     name: str
     cloud: Cloud
     edges: Edges
-    part: Part | None = None
+    part: Cloud | None = None
     tables: Sequence[Table] = ()
     other: Edges | None = None
     files: Mapping[str, str | os.PathLike[str]] = field(default_factory=dict)
@@ -105,7 +104,7 @@ def write_report(
 
 
 def _tables(case: Case) -> list[Table]:
-    compared = [] if case.other is None else [preset_table(case.edges, case.other)]
+    compared = [] if case.other is None else [method_table(case.edges, case.other)]
     return [count_table(case.edges), *compared, *case.tables, time_table(case.edges), parameter_table(case.edges)]
 
 

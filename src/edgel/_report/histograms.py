@@ -8,13 +8,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel.edges import EdgeKind, Edges
+from edgel.edges import EdgeKind, Edges, kind_names
 from edgel.plot.legend import round_length
 from edgel.plot.palette import ANY_KIND, KIND_COLORS, as_hex
 
 _WIDTH, _HEIGHT = 460, 230  # of a drawing, in its own units
 _LEFT, _RIGHT, _TOP, _BOTTOM = 58, 12, 10, 44
 _NUMBERS = 5  # along the horizontal axis
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """One of the parts that the bars of a histogram are stacked of: its name, its color (RGB) and its counts (B,)."""
+
+    name: str
+    color: tuple[int, int, int]
+    counts: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +37,8 @@ class Histogram:
         What is counted along the horizontal axis, with its unit.
     edges : (B + 1,) float64
         Ends of the bins.
-    stacks : sequence of (str, color, (B,) int)
-        Name, RGB and counts of each part, from below.
+    stacks : sequence of Stack
+        From below.
     note : str
         What has to be known to read it.
     """
@@ -37,7 +46,7 @@ class Histogram:
     title: str
     axis: str
     edges: np.ndarray
-    stacks: Sequence[tuple[str, tuple[int, int, int], np.ndarray]]
+    stacks: Sequence[Stack]
     note: str = ""
 
 
@@ -49,7 +58,7 @@ def strength_histogram(edges: Edges) -> Histogram:
         here = left & ((edges.kind & int(kind)) > 0)
         left &= ~here
         if here.any():
-            stacks.append((str(kind.name).lower(), color, np.histogram(edges.strength[here], bins)[0]))
+            stacks.append(Stack(kind_names(kind)[0], color, np.histogram(edges.strength[here], bins)[0]))
     note = "A point of several kinds counts with the first." if len(stacks) > 1 else ""
     return Histogram("Strength", "strength", bins, stacks, note)
 
@@ -66,17 +75,18 @@ def angle_histogram(edges: Edges) -> Histogram | None:
         f"Of the {known.sum():,} creases with both faces known; half turn more than {np.median(degrees):.0f} degrees."
     )
     axis = "turn from face to face (degrees)"
-    return Histogram("Angle between the faces", axis, bins, [("crease", ANY_KIND, counts)], note)
+    return Histogram("Angle between the faces", axis, bins, [Stack("crease", ANY_KIND, counts)], note)
 
 
 def as_svg(histogram: Histogram) -> str:
     """Draw a histogram; lines and letters have the color of the text around it."""
-    total = np.sum([counts for _, _, counts in histogram.stacks], axis=0)
+    total = np.sum([stack.counts for stack in histogram.stacks], axis=0)
     scale = _Scale(histogram.edges[0], histogram.edges[-1], int(total.max()))
     parts, below = [_grid(scale)], np.zeros(len(total))
-    for _, color, counts in histogram.stacks:
-        parts.append(f'<path d="{_bars(scale, histogram.edges, below, counts)}" fill="{as_hex(color)}"/>')
-        below = below + counts
+    for stack in histogram.stacks:
+        bars = _bars(scale, histogram.edges, below, stack.counts)
+        parts.append(f'<path d="{bars}" fill="{as_hex(stack.color)}"/>')
+        below = below + stack.counts
     middle = (_LEFT + _WIDTH - _RIGHT) / 2
     parts.append(f'<text x="{middle}" y="{_HEIGHT - 8}" text-anchor="middle">{html.escape(histogram.axis)}</text>')
     label = html.escape(f"{histogram.title}: a histogram", quote=True)

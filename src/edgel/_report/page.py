@@ -70,8 +70,8 @@ def _link(address: str) -> str:
 
 def _histogram(histogram: Histogram) -> str:
     names = "".join(
-        f'<span><i style="background:{as_hex(color)}"></i>{html.escape(name)}</span>'
-        for name, color, _ in histogram.stacks
+        f'<span><i style="background:{as_hex(stack.color)}"></i>{html.escape(stack.name)}</span>'
+        for stack in histogram.stacks
     )
     note = f'<p class="note">{html.escape(histogram.note)}</p>' if histogram.note else ""
     title = html.escape(histogram.title)

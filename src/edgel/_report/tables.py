@@ -16,6 +16,7 @@ import numpy as np
 
 from edgel._kernels.parallel import num_threads
 from edgel.edges import Edges
+from edgel.paper import PaperEdges
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,20 +72,25 @@ def count_table(edges: Edges) -> Table:
     return Table("Counts", rows, {"number": ",d", "share": ".1%"}, note)
 
 
-def preset_table(edges: Edges, other: Edges) -> Table:
-    """What two presets find in the same cloud, and what of it is the same."""
+def published_last(edges: Edges, other: Edges) -> list[Edges]:
+    """Two answers in the order in which they are compared."""
+    return sorted((edges, other), key=lambda one: isinstance(one, PaperEdges))
+
+
+def method_table(edges: Edges, other: Edges) -> Table:
+    """What two methods find in the same cloud, and what of it is the same."""
     rows = []
-    for one in sorted((edges, other), key=lambda one: one.preset):
+    for one in published_last(edges, other):
         kinds = ", ".join(f"{name} {number:,}" for name, number in one.count_kinds().items())
         seconds = sum(one.seconds.values())
         rows.append(
-            {"preset": one.preset, "edge points": len(one), "share": one.share, "seconds": seconds, "kinds": kinds}
+            {"method": one.method, "edge points": len(one), "share": one.share, "seconds": seconds, "kinds": kinds}
         )
     both = len(np.intersect1d(edges.index, other.index))
     share = both / (edges.num_points - edges.num_dropped)
-    rows.append({"preset": "points of both", "edge points": both, "share": share, "seconds": None, "kinds": None})
-    note = f"The preset {other.preset} was run to compare, with its own defaults."
-    return Table("Both presets", rows, {"edge points": ",d", "share": ".1%", "seconds": ".2f"}, note)
+    rows.append({"method": "points of both", "edge points": both, "share": share, "seconds": None, "kinds": None})
+    note = f"The method {other.method} was run to compare, with its own defaults."
+    return Table("Both methods", rows, {"edge points": ",d", "share": ".1%", "seconds": ".2f"}, note)
 
 
 def time_table(edges: Edges) -> Table:
@@ -97,7 +103,7 @@ def time_table(edges: Edges) -> Table:
 
 def parameter_table(edges: Edges) -> Table:
     """Parameters of the method, those it chose itself included."""
-    rows = [{"parameter": "preset", "value": edges.preset}, {"parameter": "method", "value": edges.method}]
+    rows = [{"parameter": "method", "value": edges.method}]
     rows += [{"parameter": name, "value": value} for name, value in edges.parameters.items()]
     why = f" Why the method {edges.method}: {edges.reason}." if edges.reason else ""
     return Table("Parameters", rows, {"value": "g"}, f"Lengths are in the cloud's unit.{why}")

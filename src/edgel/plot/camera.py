@@ -19,6 +19,33 @@ _SLACK = 0.2  # what a frame by percentiles is widened by; a cloud without outli
 
 
 @dataclass(frozen=True, eq=False)
+class Viewport:
+    """What a picture shows of a cloud, and how large.
+
+    Attributes
+    ----------
+    size, direction, crop, detail, point_size
+        As `edgel.plot.picture` takes them; the size without the legend.
+    margin : float
+        Free rim, as a share of the smaller side.
+    """
+
+    size: tuple[int, int]
+    direction: Any = "auto"
+    crop: bool = False
+    detail: tuple[Any, float] | None = None
+    point_size: float | None = None
+    margin: float = 0.03
+
+    def check(self) -> None:
+        """Raise a ValueError if a size is out of its range."""
+        if len(self.size) != 2 or min(self.size) < 16 or max(self.size) > 20_000:
+            raise ValueError(f"size: expected width and height from 16 to 20,000 pixels, got {self.size!r}")
+        if self.point_size is not None and not 0 <= self.point_size <= 200:
+            raise ValueError(f"point_size: expected 0 to 200 pixels, got {self.point_size}")
+
+
+@dataclass(frozen=True, eq=False)
 class Camera:
     """A viewer: three axes at right angles, and an eye when the picture is in perspective.
 
@@ -35,19 +62,19 @@ class Camera:
     back: np.ndarray
     eye: np.ndarray | None = None
 
-    def place(self, xyz: np.ndarray) -> np.ndarray:
-        """Give points (N, 3) their place on the picture plane and their distance from the viewer, (N, 3).
+    def project(self, xyz: np.ndarray) -> np.ndarray:
+        """Give points (N, 3) their position on the picture plane and their distance from the viewer, (N, 3).
 
         The first two columns count right and up, in the cloud's unit or, in perspective, per unit of distance (NaN
         behind the eye); the third grows away from the viewer, in the cloud's unit.
         """
         x, y, z = (xyz if self.eye is None else xyz - self.eye).T
         # No matrix product: its rounding may depend on where in the array a point stands.
-        placed = np.column_stack([x * a + y * b + z * c for a, b, c in (self.right, self.up, -self.back)])
+        projected = np.column_stack([x * a + y * b + z * c for a, b, c in (self.right, self.up, -self.back)])
         if self.eye is None:
-            return placed
-        ahead = np.where(placed[:, 2] > 0, placed[:, 2], np.nan)
-        return np.column_stack([placed[:, 0] / ahead, placed[:, 1] / ahead, ahead])
+            return projected
+        ahead = np.where(projected[:, 2] > 0, projected[:, 2], np.nan)
+        return np.column_stack([projected[:, 0] / ahead, projected[:, 1] / ahead, ahead])
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +86,7 @@ class Frame:
     width, height : int
         Size of the picture, in pixels.
     left, top : float
-        Place of its upper left corner on the picture plane.
+        Its upper left corner on the picture plane.
     pixel : float
         Size of a pixel there.
     """
@@ -70,9 +97,9 @@ class Frame:
     top: float
     pixel: float
 
-    def columns_rows(self, placed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Where points of the picture plane fall, in pixels from the left and from above, both (N,) float64."""
-        return (placed[:, 0] - self.left) / self.pixel, (self.top - placed[:, 1]) / self.pixel
+    def to_pixels(self, projected: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return where projected points (N, 3) fall, in pixels from the left and from above, both (N,) float64."""
+        return (projected[:, 0] - self.left) / self.pixel, (self.top - projected[:, 1]) / self.pixel
 
 
 def choose_camera(cloud: Cloud, direction: Any) -> Camera:
@@ -110,30 +137,27 @@ def choose_camera(cloud: Cloud, direction: Any) -> Camera:
     return camera or _looking(np.array(OBLIQUE))
 
 
-def choose_frame(placed: np.ndarray, size: tuple[int, int], *, margin: float, crop: bool) -> Frame:
-    """Fit (N, 3) placed points into a picture, without the outliers that would make all else small.
+def choose_frame(projected: np.ndarray, viewport: Viewport) -> Frame:
+    """Fit points into a picture, without the outliers that would make all else small.
 
     Parameters
     ----------
-    placed : (N, 3) float64
-        From `Camera.place`.
-    size : (int, int)
-        Width and height, in pixels.
-    margin : float
-        Free rim, as a share of the smaller side.
-    crop : bool
-        Make the picture no larger than the cloud and its rim need.
+    projected : (N, 3) float64
+        From `Camera.project`.
+    viewport : Viewport
+        Its size, its margin, and whether it is cropped count.
     """
-    plane = placed[np.isfinite(placed[:, 0]), :2]
+    size = viewport.size
+    plane = projected[np.isfinite(projected[:, 0]), :2]
     low, high = np.percentile(plane, [_TAIL, 100.0 - _TAIL], axis=0)
     slack = _SLACK * (high - low)
     low, high = np.maximum(plane.min(axis=0), low - slack), np.minimum(plane.max(axis=0), high + slack)
     extent = high - low
-    rim = margin * min(size)
+    rim = viewport.margin * min(size)
     pixel = float((extent / (np.array(size) - 2 * rim)).max())
     if not pixel > 0:
         pixel = 1.0  # one point, or all on one line of sight: any scale will do
-    width, height = np.minimum(np.ceil(extent / pixel + 2 * rim), size).astype(int) if crop else size
+    width, height = np.minimum(np.ceil(extent / pixel + 2 * rim), size).astype(int) if viewport.crop else size
     left, top = (low + high) / 2 + np.array([-width, height]) * pixel / 2
     return Frame(int(width), int(height), float(left), float(top), pixel)
 
@@ -156,7 +180,7 @@ def detail_frame(camera: Camera, place: Any, extent: float, size: tuple[int, int
     ValueError
         If the place lies behind the viewer, or there is no width.
     """
-    x, y, distance = camera.place(as_vector(place, "detail")[None])[0]
+    x, y, distance = camera.project(as_vector(place, "detail")[None])[0]
     if not extent > 0 or np.isnan(x):
         raise ValueError(f"detail: expected a place before the viewer and a width above 0, got {place!r}, {extent!r}")
     pixel = float(extent) / size[0] / (1.0 if camera.eye is None else distance)

@@ -1,7 +1,9 @@
-"""A cloud with its edges, laid out once, to be drawn on white or on black."""
+"""Pictures of clouds with their edges on top, a legend and a scale bar below."""
 
 from __future__ import annotations
 
+import os
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,80 +11,167 @@ from PIL import Image
 
 from edgel.cloud import as_cloud
 from edgel.edges import Edges, kind_names
-from edgel.plot.legend import Entry, Strip
-from edgel.plot.palette import KIND_COLORS, kind_colors, ramp_colors
-from edgel.plot.scene import FINE, Scene
-from edgel.plot.surface import SHEETS, Sheet, Surface
+from edgel.io.files import replacing
+from edgel.plot.arrows import LONGEST, Arrows
+from edgel.plot.camera import Viewport
+from edgel.plot.legend import Entry, Legend
+from edgel.plot.palette import KIND_COLORS, THEMES, kind_colors, ramp_colors
+from edgel.plot.shading import Shading
+from edgel.plot.zbuffer import SUPERSAMPLING, ZBuffer
 
 EDGE_COLORS = ("kind", "strength")
 
-_MARGIN = 0.03  # free rim, as a share of the picture's smaller side
 
-
-class Drawing:
-    """A picture of a cloud and its edges that is still to be drawn on something.
+def picture(
+    points: Any,
+    edges: Edges | None = None,
+    *,
+    direction: Any = "auto",
+    size: tuple[int, int] = (1200, 900),
+    crop: bool = False,
+    color_by: str = "grey",
+    edge_color: str = "kind",
+    normals: bool = False,
+    background: str = "light",
+    legend: bool = True,
+    detail: tuple[Any, float] | None = None,
+    point_size: float | None = None,
+) -> np.ndarray:
+    """Draw a cloud and its edges on top, with a legend and a scale bar.
 
     Parameters
     ----------
-    points, edges, direction, size, crop, color_by, edge_color, legend, detail
-        As `edgel.plot.picture` takes them.
+    points : (N, 3) or (H, W, 3) array_like, Cloud, or an object that carries points
+        Points that are not finite are left out; a few far outliers may fall outside the picture.
+    edges : Edges, optional
+        Of these points. Those hidden behind nearer parts of the cloud are not drawn. ``edges.of_kinds("crease")`` and
+        ``edges.take(edges.strength > 0.9)`` choose some.
+    direction : {"auto", "top", "oblique", "sensor"} or (3,) array_like
+        ``"top"`` looks down -Z as the paper does, ``"sensor"`` from the cloud's viewpoint, ``"oblique"`` from the front
+        and above; ``"auto"`` takes the sensor's view where there is one. A vector points away from the viewer.
+    size : (int, int)
+        Width and height, in pixels.
+    crop : bool
+        Make the picture no larger than the cloud and the legend need.
+    color_by : {"grey", "rgb", "intensity", "height", "normals"}
+        Color of the surface: none but its shading; the colors or the intensity that the cloud carries; z, from violet
+        to green; or the slope, with x, y, z of the normal as red, green, blue.
+    edge_color : {"kind", "strength"}
+        Color of the edge points: `edgel.plot.palette.KIND_COLORS`, or from light green, the weakest, to violet.
+    normals : bool
+        Draw the first normal of the edge points as arrows, at an even selection of them.
+    background : {"light", "dark"}
+        What the picture is drawn on.
+    legend : bool
+        Say below the cloud what the colors mean, and how long things are: the bar in units of the cloud, in perspective
+        at half of what is seen.
+    detail : ((3,) array_like, float), optional
+        Show only what lies around a place, and how wide a piece, in the cloud's unit.
+    point_size : float, optional
+        Width of the points, in pixels. Default: so wide that they close to a surface.
+
+    Returns
+    -------
+    (height, width, 3) uint8
+        RGB.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If `points` carries no finite coordinates or not what it shall be colored by, `edges` are of another cloud, an
+        option is out of its range, or the legend leaves no space for the cloud.
+
+    Examples
+    --------
+    >>> import numpy as np, edgel
+    >>> from edgel import plot
+    >>> x, y = np.meshgrid(np.arange(40.0), np.arange(40.0))
+    >>> roof = np.c_[x.ravel(), y.ravel(), -abs(x.ravel() - 20)]
+    >>> plot.save("roof.png", plot.picture(roof, edgel.detect(roof), size=(400, 300)))
+    """
+    viewport = Viewport(size, direction, crop=crop, detail=detail, point_size=point_size)
+    look = {"color_by": color_by, "edge_color": edge_color, "normals": normals, "legend": legend}
+    return Drawing(points, edges, viewport, **look).on(background)
+
+
+def save(path: str | os.PathLike[str], picture: np.ndarray) -> None:
+    """Write a picture (H, W, 3) uint8 as PNG, in one step.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written there.
+    """
+    with replacing(path) as file:
+        Image.fromarray(picture).save(file, format="PNG", optimize=True)
+
+
+class Drawing:
+    """A picture of a cloud and its edges, laid out once, to be drawn on a light or a dark background.
+
+    Parameters
+    ----------
+    points, edges, color_by, edge_color, normals, legend
+        As `picture` takes them.
+    viewport : Viewport
+
+    Attributes
+    ----------
+    buffer : ZBuffer
+        Of the cloud.
     """
 
     def __init__(
         self,
         points: Any,
-        edges: Edges | None = None,
+        edges: Edges | None,
+        viewport: Viewport,
         *,
-        direction: Any = "auto",
-        size: tuple[int, int],
-        crop: bool = False,
         color_by: str = "grey",
         edge_color: str = "kind",
+        normals: bool = False,
         legend: bool = True,
-        detail: tuple[Any, float] | None = None,
     ) -> None:
         if edge_color not in EDGE_COLORS:
             raise ValueError(f"edge_color: expected one of {', '.join(EDGE_COLORS)}, got {edge_color!r}")
         cloud = as_cloud(points)
         if edges is not None and edges.num_points != len(cloud):
             raise ValueError(f"edges: found in a cloud of {edges.num_points:,} points, this one has {len(cloud):,}")
-        self._surface = Surface(cloud, color_by)
-        self._colors, entries = _edge_colors(edges, edge_color)
-        self._strip = Strip(entries + self._surface.entries, size[0]) if legend else None
-        room = size[1] - (self._strip.height if self._strip else 0)
-        if self._strip and (room < size[1] / 2 or not self._strip.fits):
-            what = f"{size[0]} x {size[1]} has no room for the legend"
-            raise ValueError(f"size: {what}; choose a larger one, or legend=False")
-        self._width = size[0]
-        self._scene = Scene(cloud, direction=direction, size=(size[0], room), crop=crop, margin=_MARGIN, detail=detail)
-        self._shown = None if edges is None else self._scene.on_top(edges.index)
+        viewport.check()
+        self._width, height = viewport.size
+        self._singly = viewport.point_size is not None
+        self._shading = Shading(cloud, color_by)
+        self._edge_colors, entries = _edge_colors(edges, edge_color)
+        pointed = edges if normals else None
+        if pointed is not None:
+            entries.append(Entry.arrow("normals"))
+            viewport = replace(viewport, margin=LONGEST)
+        self._legend = Legend(entries + self._shading.entries, viewport.size) if legend else None
+        if self._legend is not None:
+            height -= self._legend.height
+        self.buffer = ZBuffer(cloud, replace(viewport, size=(self._width, height)))
+        self._shown = None if edges is None else self.buffer.overlay(edges.index)
+        self._arrows = None if pointed is None else Arrows(self.buffer, pointed)
 
     def on(self, background: str) -> np.ndarray:
         """Draw it on a ``"light"`` or a ``"dark"`` background, (height, width, 3) uint8."""
-        sheet = sheet_of(background)
-        fine = self._surface.paint(self._scene, sheet)
+        if background not in THEMES:
+            raise ValueError(f"background: expected one of {', '.join(THEMES)}, got {background!r}")
+        theme = THEMES[background]
+        painted = self._shading.paint(self.buffer, theme, singly=self._singly)
         if self._shown is not None:
             seen = self._shown >= 0
-            fine[seen] = self._colors[self._shown[seen]]
-        drawn = reduced(Image.fromarray(fine))
-        if self._strip is None:
-            return drawn
-        canvas = Image.new("RGB", (self._width, len(drawn) + self._strip.height), sheet.paper)
-        canvas.paste(Image.fromarray(drawn), ((self._width - drawn.shape[1]) // 2, 0))
-        self._strip.draw(canvas, len(drawn), sheet.ink, *self._scene.scale())
+            painted[seen] = self._edge_colors[self._shown[seen]]
+        image = Image.fromarray(painted)
+        if self._arrows is not None:
+            self._arrows.draw(image, theme.ink)
+        image = image.reduce(SUPERSAMPLING)
+        if self._legend is None:
+            return np.asarray(image)
+        canvas = Image.new("RGB", (self._width, image.height + self._legend.height), theme.background)
+        canvas.paste(image, ((self._width - image.width) // 2, 0))
+        self._legend.draw(canvas, image.height, theme.ink, *self.buffer.scale())
         return np.asarray(canvas)
-
-
-def sheet_of(background: str) -> Sheet:
-    """Return what a background is called by."""
-    if background not in SHEETS:
-        raise ValueError(f"background: expected one of {', '.join(SHEETS)}, got {background!r}")
-    return SHEETS[background]
-
-
-def reduced(fine: Image.Image) -> np.ndarray:
-    """Average the fine pixels of each pixel, (H, W, 3) uint8."""
-    return np.asarray(fine.reduce(FINE))
 
 
 def _edge_colors(edges: Edges | None, edge_color: str) -> tuple[np.ndarray, list[Entry]]:

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from edgel.plot.arrows import draw_arrow
+
 _SMALLEST, _LARGEST = 11, 40  # size of the letters, in pixels
 _LETTERS = 64  # size of the letters: one in so many of the picture's width
 _BAR = 0.16  # longest scale bar, as a share of the picture's width
-_RAMP = 4.0  # length of a ramp of colors, in letter sizes
+_ARROW, _SQUARE, _RAMP = 1.6, 0.8, 4.0  # length of an arrow, of one color, and of several, in letter sizes
 _LONGEST_LABEL = "0.005 units at distance 0.0005"
 
 
@@ -21,7 +23,7 @@ class Entry:
     Attributes
     ----------
     colors : (K, 3) uint8
-        One is shown as a square, several as a ramp from the first to the last.
+        One is shown as a square, several as a ramp from the first to the last, none as an arrow.
     text : str
         To the right of them.
     before : str
@@ -32,35 +34,55 @@ class Entry:
     text: str
     before: str = ""
 
+    @classmethod
+    def arrow(cls, text: str) -> Entry:
+        """Make the entry of what is drawn as arrows, in the color of the letters."""
+        return cls(np.empty((0, 3), np.uint8), text)
 
-class Strip:
-    """A strip as wide as the picture, with room for entries and a scale bar.
+
+@dataclass(frozen=True, eq=False)
+class _Placed:
+    """An entry, its left end in pixels, and its line from above."""
+
+    entry: Entry
+    left: int
+    line: int
+
+
+class Legend:
+    """Entries and a scale bar, in a strip as wide as the picture.
 
     Parameters
     ----------
     entries : sequence of Entry
-    width : int
-        Pixels of the picture.
+    size : (int, int)
+        Of the picture with its legend, in pixels.
 
     Attributes
     ----------
     height : int
-        In pixels.
-    fits : bool
-        Whether its width holds every entry and the bar.
+        Of the legend, in pixels.
+
+    Raises
+    ------
+    ValueError
+        If an entry is wider than the picture, or the legend higher than half of it.
     """
 
-    def __init__(self, entries: list[Entry], width: int) -> None:
+    def __init__(self, entries: list[Entry], size: tuple[int, int]) -> None:
+        width = size[0]
         self._letter = int(np.clip(width / _LETTERS, _SMALLEST, _LARGEST))
         self._font = ImageFont.load_default(self._letter)
         self._width, self._line, self._rim = width, round(1.7 * self._letter), round(0.8 * self._letter)
         self._gap = round(1.4 * self._letter)
-        self._places = self._break(entries)
-        last = max((x + self._size(entry) for entry, x, line in self._places if line == self._last), default=0)
+        self._placed = self._break(entries)
+        last = max((one.left + self._size(one.entry) for one in self._placed if one.line == self._last), default=0)
         bar = _BAR * width + 0.5 * self._letter + self._font.getlength(_LONGEST_LABEL)
         self._bar_line = self._last + (last > 0 and last + self._gap + bar > width - self._rim)
-        self.fits = max([bar, *map(self._size, entries)]) + 2 * self._rim <= width
         self.height = (self._bar_line + 1) * self._line + self._rim
+        if max([bar, *map(self._size, entries)]) + 2 * self._rim > width or self.height > size[1] / 2:
+            what = f"{size[0]} x {size[1]} has no room for the legend"
+            raise ValueError(f"size: {what}; choose a larger one, or legend=False")
 
     def draw(self, image: Image.Image, top: int, ink: tuple[int, int, int], pixel: float, distance: float) -> None:
         """Draw it on an image from row `top` on.
@@ -75,8 +97,8 @@ class Strip:
             Where the bar has its length, in perspective; NaN where it has it everywhere.
         """
         draw = ImageDraw.Draw(image)
-        for entry, x, line in self._places:
-            self._draw_entry(draw, entry, x, top + (line + 0.5) * self._line, ink)
+        for placed in self._placed:
+            self._draw_entry(draw, placed.entry, placed.left, top + (placed.line + 0.5) * self._line, ink)
         length = round_length(_BAR * self._width * pixel)
         away = "" if np.isnan(distance) else f" at distance {distance:.2g}"
         label = f"{length:g} unit{'s' * (length != 1)}{away}"
@@ -91,18 +113,18 @@ class Strip:
 
     @property
     def _last(self) -> int:
-        return max((line for _, _, line in self._places), default=0)
+        return max((one.line for one in self._placed), default=0)
 
-    def _break(self, entries: list[Entry]) -> list[tuple[Entry, int, int]]:
-        """Give each entry its place from the left, and its line."""
-        places, x, line = [], self._rim, 0
+    def _break(self, entries: list[Entry]) -> list[_Placed]:
+        """Put the entries beside each other, in as many lines as they need."""
+        placed, x, line = [], self._rim, 0
         for entry in entries:
             size = self._size(entry)
             if x > self._rim and x + size > self._width - self._rim:
                 x, line = self._rim, line + 1
-            places.append((entry, x, line))
+            placed.append(_Placed(entry, x, line))
             x += size + self._gap
-        return places
+        return placed
 
     def _size(self, entry: Entry) -> int:
         """Width of an entry, in pixels."""
@@ -110,7 +132,8 @@ class Strip:
         return round(words + self._patch(entry))
 
     def _patch(self, entry: Entry) -> int:
-        return round(self._letter * (_RAMP if len(entry.colors) > 1 else 0.8))
+        """Width of the colors of an entry, in pixels."""
+        return round(self._letter * (_ARROW, _SQUARE, _RAMP)[min(len(entry.colors), 2)])
 
     def _draw_entry(self, draw: ImageDraw.ImageDraw, entry: Entry, x: float, middle: float, ink: tuple) -> None:
         if entry.before:
@@ -118,9 +141,13 @@ class Strip:
             x += self._font.getlength(entry.before) + 0.45 * self._letter
         patch, half = self._patch(entry), round(0.4 * self._letter)
         left, top = round(x), round(middle) - half
-        for column in range(patch):
-            color = entry.colors[column * len(entry.colors) // patch]
-            draw.line([left + column, top, left + column, top + 2 * half], fill=tuple(map(int, color)))
+        if len(entry.colors):
+            for column in range(patch):
+                color = entry.colors[column * len(entry.colors) // patch]
+                draw.line([left + column, top, left + column, top + 2 * half], fill=tuple(map(int, color)))
+        else:
+            ends = np.array([[left, middle], [left + patch, middle]])
+            draw_arrow(draw, *ends, width=max(self._letter / 8, 1.0), color=ink)
         draw.text((left + patch + 0.45 * self._letter, middle), entry.text, fill=ink, font=self._font, anchor="lm")
 
 

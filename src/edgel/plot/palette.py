@@ -1,12 +1,13 @@
 """The colors of edges, one for each kind, the same in pictures, figures, reports and viewers.
 
 They are told apart with normal vision and without red, green or blue cones, from each other and from the greys of a
-shaded surface, on white and on black (`tests/test_palette.py` measures it). Kinds that belong together look related:
-the near and the far side of a depth step are a dark and a light blue.
+shaded surface, on white and on black (`tests/plot/test_palette.py` measures it). Kinds that belong together look
+related: the near and the far side of a depth step are a dark and a light blue.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,32 @@ KIND_COLORS: dict[EdgeKind, tuple[int, int, int]] = {
 
 ANY_KIND = KIND_COLORS[EdgeKind.CREASE]
 """Color of edge points whose kind is not told."""
+
+
+@dataclass(frozen=True, eq=False)
+class Theme:
+    """The colors of a picture's background and of what is drawn on it.
+
+    Attributes
+    ----------
+    background, ink : (int, int, int)
+        Color where there is nothing, and of letters, scale bar and arrows.
+    greys : (int, int)
+        Of the darkest and of the lightest slope of a surface.
+    point_greys : (int, int)
+        The same of points drawn singly, which have to stand out from the background.
+    """
+
+    background: tuple[int, int, int]
+    ink: tuple[int, int, int]
+    greys: tuple[int, int]
+    point_greys: tuple[int, int]
+
+
+THEMES = {
+    "light": Theme((255, 255, 255), (28, 28, 28), greys=(120, 236), point_greys=(20, 170)),
+    "dark": Theme((23, 23, 26), (232, 232, 230), greys=(105, 205), point_greys=(105, 240)),
+}
 
 # Viridis (S. van der Walt, N. Smith, CC0) at even steps: ever lighter, for eyes that tell no hues apart too.
 _RAMP = np.array(

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from edgel._report.figures.compose import FigureImage, figure_image
-from edgel._report.figures.published import figure_1, figure_3, figure_4, figure_5, surface
+from edgel._report.figures.published import figure_1, figure_3, figure_4, figure_5
 from edgel._report.figures.views import figure_6, figure_8, figure_9
 from edgel.cloud import Cloud
 from edgel.edges import Edges
 from edgel.paper import PaperEdges
-from edgel.synth import Part
 
-__all__ = ["FigureImage", "draw_figures", "surface"]
+__all__ = ["FigureImage", "draw_figures"]
 
 
 def draw_figures(
-    cloud: Cloud, edges: Edges, *, name: str, part: Part | None = None, other: Edges | None = None
+    cloud: Cloud, edges: Edges, *, name: str, part: Cloud | None = None, other: Edges | None = None
 ) -> tuple[FigureImage, ...]:
     """Draw the paper's figures 1, 3, 4 and 5 of a cloud, and what the paper has not.
 
@@ -25,10 +24,11 @@ def draw_figures(
         Of this cloud. Those of the published method have a projection and an edge map, which figures 1 (c) and 3 show.
     name : str
         What the captions call it.
-    part : Part, optional
-        The part a simulated cloud was scanned from, for figure 1 (a).
+    part : Cloud, optional
+        Evenly sampled points, dense and without noise, of the surface that a simulated cloud was scanned from, for
+        figure 1 (a).
     other : Edges, optional
-        What another preset finds in this cloud, for figure 9.
+        What another method finds in this cloud, for figure 9.
 
     Returns
     -------
@@ -38,7 +38,7 @@ def draw_figures(
     """
     contents = [figure_1(cloud, edges, name, part)]
     if isinstance(edges, PaperEdges):
-        contents.append(figure_3(edges, name, part))
+        contents.append(figure_3(edges, name))
     contents += [figure_4(cloud, edges, name), figure_5(cloud, edges, name)]
     if len(edges.count_kinds()) > 1:
         contents.append(figure_6(cloud, edges, name))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from edgel.plot.surface import SHEETS, Sheet
+from edgel.plot.palette import THEMES, Theme
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,6 +50,17 @@ class FigureImage:
     dark: bytes
 
 
+@dataclass(frozen=True)
+class Box:
+    """A place marked in an image, in its pixels, and what it is called."""
+
+    left: float
+    top: float
+    right: float
+    bottom: float
+    name: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class Panel:
     """One image of a figure.
@@ -63,15 +74,15 @@ class Panel:
         Its own pixels are what is shown, at any size.
     extent : (left, right, bottom, top) or None
         With it the panel has axes in the cloud's unit.
-    boxes : sequence of (left, top, right, bottom, name)
-        Places marked in it, in pixels of the image.
+    boxes : sequence of Box
+        Places marked in it.
     """
 
     image: Callable[[str], np.ndarray]
     title: str = ""
     raster: bool = False
     extent: tuple[float, float, float, float] | None = None
-    boxes: Sequence[tuple[float, float, float, float, str]] = ()
+    boxes: Sequence[Box] = ()
 
     def aspect(self, image: np.ndarray) -> float:
         """Width over height as its image is shown."""
@@ -89,16 +100,15 @@ class Content:
     caption: str
     panels: Sequence[Panel]
     legend: Sequence[tuple[Color, str]] = field(default_factory=list)
-    unit: str = ""
 
 
 def figure_image(content: Content) -> FigureImage:
     """Draw a figure on white and on black."""
     light, dark = (
-        _compose(content, [panel.image(background) for panel in content.panels], SHEETS[background])
+        _compose(content, [panel.image(background) for panel in content.panels], THEMES[background])
         for background in ("light", "dark")
     )
-    captioned = _with_caption(light, content.caption, SHEETS["light"])
+    captioned = _with_caption(light, content.caption, THEMES["light"])
     forms = ((captioned, {"format": "PNG"}), (light, _SMALL), (dark, _SMALL))
     with ThreadPoolExecutor(len(forms)) as pool:  # packing takes as long as drawing
         files = pool.map(lambda image, form: _encoded(image, **form), *zip(*forms, strict=True))
@@ -111,20 +121,20 @@ def _encoded(image: Image.Image, **form: Any) -> bytes:
         return file.getvalue()
 
 
-def _with_caption(image: Image.Image, caption: str, sheet: Sheet) -> Image.Image:
+def _with_caption(image: Image.Image, caption: str, theme: Theme) -> Image.Image:
     """Set the caption below a figure."""
     font = ImageFont.load_default(_LETTER)
     lines = textwrap.wrap(caption, 120)
-    canvas = Image.new("RGB", (image.width, image.height + _LINE * len(lines) + _GAP // 2), sheet.paper)
+    canvas = Image.new("RGB", (image.width, image.height + _LINE * len(lines) + _GAP // 2), theme.background)
     canvas.paste(image)
     draw = ImageDraw.Draw(canvas)
     for number, line in enumerate(lines):
         place = (image.width / 2, image.height + _LINE * (number + 0.5))
-        draw.text(place, line, fill=sheet.ink, font=font, anchor="mm")
+        draw.text(place, line, fill=theme.ink, font=font, anchor="mm")
     return canvas
 
 
-def _compose(content: Content, images: Sequence[np.ndarray], sheet: Sheet) -> Image.Image:
+def _compose(content: Content, images: Sequence[np.ndarray], theme: Theme) -> Image.Image:
     """Set the panels side by side at one height, with titles and legend."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -139,14 +149,14 @@ def _compose(content: Content, images: Sequence[np.ndarray], sheet: Sheet) -> Im
     above = _TITLE if any(panel.title for panel in panels) else _GAP // 2
     below = axes_strip + _LEGEND * bool(content.legend) + _GAP // 2
     total = above + height + below
-    figure = Figure(figsize=(_WIDTH / _DPI, total / _DPI), dpi=_DPI, facecolor=_share(sheet.paper))
+    figure = Figure(figsize=(_WIDTH / _DPI, total / _DPI), dpi=_DPI, facecolor=_share(theme.background))
     canvas = FigureCanvasAgg(figure)
-    ink = _share(sheet.ink)
+    ink = _share(theme.ink)
     left = round((_WIDTH + axes_strip - height * sum(aspects) - gaps) / 2)
     for panel, image, aspect in zip(panels, images, aspects, strict=True):
         width = round(aspect * height)
         axes = figure.add_axes((left / _WIDTH, below / total, width / _WIDTH, height / total), facecolor="none")
-        _show(axes, panel, image, content.unit, ink)
+        _show(axes, panel, image, ink)
         left += width + _GAP + axes_strip
     if content.legend:
         _legend(figure, content.legend, (below - axes_strip - _LEGEND / 2) / total, ink)
@@ -154,16 +164,17 @@ def _compose(content: Content, images: Sequence[np.ndarray], sheet: Sheet) -> Im
     return Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy())
 
 
-def _show(axes: Axes, panel: Panel, image: np.ndarray, unit: str, ink: tuple[float, float, float]) -> None:
+def _show(axes: Axes, panel: Panel, image: np.ndarray, ink: tuple[float, float, float]) -> None:
     if panel.title:
         axes.set_title(panel.title, fontsize=11, pad=6, color=ink)
     if panel.extent is None:
         axes.imshow(image, interpolation="nearest" if panel.raster else "antialiased", aspect="auto")
         axes.set_axis_off()
-        for left, top, right, bottom, name in panel.boxes:
-            corners = [left, right, right, left, left], [top, top, bottom, bottom, top]
+        for box in panel.boxes:
+            corners = [box.left, box.right, box.right, box.left, box.left], [box.top] * 2 + [box.bottom] * 2 + [box.top]
             axes.plot(*corners, color=ink, linewidth=1.2, scalex=False, scaley=False)
-            axes.annotate(name, (left, top), (2, -3), textcoords="offset points", va="top", fontsize=10, color=ink)
+            place = {"xy": (box.left, box.top), "xytext": (2, -3), "textcoords": "offset points", "va": "top"}
+            axes.annotate(box.name, **place, fontsize=10, color=ink)
         return
     left, right, bottom, top = panel.extent
     axes.imshow(image, interpolation="nearest", aspect="auto", extent=panel.extent)
@@ -171,8 +182,8 @@ def _show(axes: Axes, panel: Panel, image: np.ndarray, unit: str, ink: tuple[flo
     axes.set_xlim(left - _RIM * (right - left), right + _RIM * (right - left))
     axes.set_ylim(bottom - _RIM * (top - bottom), top + _RIM * (top - bottom))
     axes.spines[:].set_color("0.6")
-    axes.set_xlabel(f"x ({unit})" if unit else "x", fontsize=9, color=ink)
-    axes.set_ylabel(f"y ({unit})" if unit else "y", fontsize=9, color=ink)
+    axes.set_xlabel("x", fontsize=9, color=ink)
+    axes.set_ylabel("y", fontsize=9, color=ink)
     axes.tick_params(labelsize=8, color="0.6", labelcolor=ink)
 
 
