@@ -11,8 +11,8 @@ from rivals import RIVALS
 
 import edgel
 from edgel import metrics
-from edgel.edges import EdgeKind
 from edgel._neighbors.thinning import median_spacing
+from edgel.edges import EdgeKind
 
 FAMILIES = ("abc", "abc_noise_0.04", "shrec", "default")
 METHODS = ("edgel default", "edgel paper", "surface variation")

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from edgel import evidence, paper, synth
+from edgel._kernels.parallel import kernel, run_slices
 from edgel._neighbors.kdtree import _SHARED_LEVELS, bounds, build_index
 from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.normals import by_offset, fit_planes
-from edgel._kernels.parallel import kernel, run_slices
 from edgel.paper.projection import back_project, grey_image, occupied_spacing, points_near, project
 
 K = 16

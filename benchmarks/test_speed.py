@@ -17,11 +17,11 @@ import pytest
 
 import edgel
 from edgel import paper, synth
-from edgel.paper.canny import canny
-from edgel.io import ply
 from edgel._neighbors.kdtree import bounds, build_index
 from edgel._neighbors.knn import knn
 from edgel._neighbors.normals import fit_planes
+from edgel.io import ply
+from edgel.paper.canny import canny
 from edgel.paper.projection import back_project, project
 
 

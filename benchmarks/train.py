@@ -21,9 +21,9 @@ import numpy as np
 import training
 
 from edgel import evidence, metrics
+from edgel._neighbors.kdtree import build_index, leaf_starts
 from edgel._surface import Evidence, coarse
 from edgel._surface.forest import Forest, evaluate, read_forests
-from edgel._neighbors.kdtree import build_index, leaf_starts
 
 CACHE = Path(__file__).parent / "cache" / "training"
 OUT = Path(evidence.__file__).parent / evidence.WEIGHTS

@@ -15,8 +15,8 @@ ROOT = Path(edgel.__file__).parent
 FLOORS = [
     {"cloud", "_kernels", "_stages"},
     {"edges", "_neighbors", "io"},
-    {"_surface", "_range_image", "_color", "paper", "plot", "synth", "metrics"},
-    {"_labels", "_scale", "_detect", "export"},
+    {"_scale", "_surface", "_range_image", "_color", "paper", "plot", "synth", "metrics"},
+    {"_labels", "_detect", "export"},
     {"_report"},
     {"_demo", "_viewer"},
     {"_cli"},

@@ -2,15 +2,22 @@
 
 import numpy as np
 import pytest
-from hall import hall, roof, same
+from hall import hall, roof
 
 import edgel
 from edgel._neighbors.spacing import median_spacing
-from edgel._scale import at_scale
+from edgel._neighbors.thinning import thin
 
 
-def test_scale_one_is_detect():
-    same(at_scale(edgel.detect, hall(), 1.0), edgel.detect(hall()))
+def test_the_published_method_has_a_scale_too():
+    cloud = edgel.Cloud(hall())
+    found = edgel.paper.detect(cloud, scale=2.0)
+    assert found.parameters["scale"] == 2
+    assert found.num_points == len(cloud)
+    rows = thin(cloud, 2.0 * median_spacing(cloud))
+    again = edgel.paper.detect(cloud.take(rows))
+    np.testing.assert_array_equal(found.index, rows[again.index])
+    np.testing.assert_array_equal(found.position, again.position)
 
 
 def test_scale_finds_only_what_is_larger():
@@ -40,4 +47,4 @@ def test_bad_scales_are_refused(scale):
     with pytest.raises(ValueError, match="scale"):
         edgel.detect(roof(), scale=scale)
     with pytest.raises(ValueError, match="scale"):
-        at_scale(edgel.paper.detect, roof(), scale)
+        edgel.paper.detect(roof(), scale=scale)

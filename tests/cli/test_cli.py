@@ -24,7 +24,6 @@ from edgel._cli.options import METHODS
 from edgel._cli.output import print_json
 from edgel._cli.progress import COMPILING, Watch
 from edgel._cli.summary import summary
-from edgel._scale import at_scale
 
 RUNNER = CliRunner(env={"COLUMNS": "200"})
 PAPER = ("--method", "paper")
@@ -219,7 +218,7 @@ def test_the_published_method_at_a_scale(scan, tmp_path):
     result = run("detect", scan, "-o", tmp_path / "edges.npz", "--json", *PAPER, "--scale", 2, "--sigma", 1)
     assert result.exit_code == 0
     told = json.loads(result.stdout)
-    expected = at_scale(edgel.paper.detect, io.read(scan), 2, sigma=1)
+    expected = edgel.paper.detect(io.read(scan), scale=2, sigma=1)
     assert np.array_equal(io.read(tmp_path / "edges.npz").attributes["label"], expected.index)
     assert (told["method"], told["points"], told["parameters"]["scale"]) == ("paper", 2500, 2)
     assert {"thinning", "canny"} < set(told["seconds"])

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from edgel import synth
-from edgel.edges import EdgeKind
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import knn
+from edgel.edges import EdgeKind
 from edgel.synth.rays import build_ray_tree, cast
 from edgel.synth.solid import flat_normals, grid_triangles
 from edgel.synth.truth import CREASE_TURN, STEP

@@ -12,9 +12,9 @@ from edgel._cli import files, options
 from edgel._cli.errors import ExitCode, exit_codes, failing_as
 from edgel._cli.output import count, length, print_json, print_table, stdout_console
 from edgel._cli.progress import Watch
-from edgel._neighbors.candidates import at_points, every_point
 from edgel._neighbors.kdtree import bounds, build_index
 from edgel._neighbors.knn import knn
+from edgel._neighbors.queries import at_points, every_point
 from edgel.cloud import Cloud, check_points
 
 HELP = """Say what a file holds: points, extent, spacing, fields, and what may surprise (NaN, duplicates).

@@ -12,8 +12,7 @@ from typer.core import TyperCommand
 import edgel
 from edgel._cli import files
 from edgel._cli.errors import ExitCode, Failure, as_option, exit_codes, failing_as
-from edgel._cli.options import METHODS, PAPER, default_of
-from edgel._scale import at_scale
+from edgel._cli.options import METHODS, PAPER
 from edgel._stages import Stages
 from edgel.edges import Edges, as_kinds
 
@@ -36,7 +35,7 @@ def detector(method: Any) -> Callable[..., Edges]:
 
 def arguments(method: str) -> set[str]:
     """Return the names of the arguments that the command line may give to a method."""
-    return {"scale", *inspect.signature(detector(method)).parameters} - {"points", "progress"}
+    return set(inspect.signature(detector(method)).parameters) - {"points", "progress"}
 
 
 def check_options(method: str, given: dict[str, Any]) -> dict[str, Any]:
@@ -66,7 +65,6 @@ def find_edges(
     with stages("reading"):
         cloud = files.read_cloud(source, intrinsics)
     with failing_as(ExitCode.DATA, source, arguments(method)):
-        given = {"scale": default_of(edgel.detect, "scale"), **given}
-        edges = at_scale(detector(method), cloud, **given, progress=stages.progress)
+        edges = detector(method)(cloud, **given, progress=stages.progress)
     stages.seconds.update(edges.seconds)
     return cloud, edges

@@ -42,10 +42,8 @@ def python_lines(pane: Pane, settings: Settings) -> str:
     """Write the Python that finds exactly the edges of a pane."""
     imports, blunt = ["import edgel"], []
     if pane.method == "paper":
-        found = "edgel.paper.detect(cloud)"
-        if settings.scale > 1:
-            imports.append("from edgel._scale import at_scale")
-            found = f"at_scale(edgel.paper.detect, cloud, {settings.scale:g})"
+        scale = f", scale={settings.scale:g}" if settings.scale > 1 else ""
+        found = f"edgel.paper.detect(cloud{scale})"
     else:
         if not settings.kinds:
             return _NO_KIND

@@ -8,7 +8,6 @@ from typing import Literal, get_args
 
 import edgel
 from edgel._detect import DEFAULT_KINDS
-from edgel._scale import at_scale
 from edgel.cloud import Cloud
 from edgel.edges import EdgeKind, Edges
 
@@ -52,6 +51,6 @@ class Answer:
 def find_edges(cloud: Cloud, run: Run, progress: Callable[[str], None]) -> Edges:
     """Run the detector on a cloud; `progress` is called with the name of each stage as it begins."""
     if run.method == "paper":
-        return at_scale(edgel.paper.detect, cloud, run.scale, progress=progress)
+        return edgel.paper.detect(cloud, scale=run.scale, progress=progress)
     kinds = DEFAULT_KINDS | EdgeKind.COLOR if run.color else DEFAULT_KINDS
     return edgel.detect(cloud, kinds=kinds, min_strength=LEAST_STRENGTH, scale=run.scale, progress=progress)
