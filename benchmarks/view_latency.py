@@ -15,12 +15,13 @@ import statistics
 import sys
 import tempfile
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import edgel
 from edgel import synth
-from edgel._viewer.server import running
+from edgel._viewer.server import Viewer, running
 from edgel._viewer.settings import Settings
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
@@ -66,20 +67,29 @@ FRAMES = """async () => {
 }"""
 
 
-def in_server(session: Any, page: Any) -> list[float]:
-    """Milliseconds from settings to handles, without a browser."""
+@dataclass(frozen=True)
+class Latency:
+    """Medians of the moves, and what a frame takes, in milliseconds."""
+
+    count: float
+    picture: float
+    frame: float
+
+
+def in_server(viewer: Viewer) -> float:
+    """Median milliseconds from settings to handles, without a browser."""
     taken = []
     for move in range(MOVES):
         start = time.perf_counter()
-        session.settings = Settings(strength=0.6 + 0.03 * move)
-        page.refresh()
-        assert page.wait_idle(PATIENCE / 1000)
+        viewer.session.settings = Settings(strength=0.6 + 0.03 * move)
+        viewer.page.refresh()
+        assert viewer.page.wait_idle(PATIENCE / 1000)
         taken.append(1000 * (time.perf_counter() - start))
-    session.settings = Settings()
-    return taken
+    viewer.session.settings = Settings()
+    return statistics.median(taken)
 
 
-def in_browser(tab: Any) -> tuple[list[float], list[float], float]:
+def in_browser(tab: Any) -> Latency:
     counts, pictures = [], []
     field = input_of(tab, "Strength ≥").element_handle()
     for move in range(MOVES):
@@ -87,26 +97,29 @@ def in_browser(tab: Any) -> tuple[list[float], list[float], float]:
         counts.append(count)
         pictures.append(picture)
         tab.wait_for_timeout(300)
-    return counts, pictures, tab.evaluate(FRAMES)
+    return Latency(statistics.median(counts), statistics.median(pictures), tab.evaluate(FRAMES))
 
 
 def measure(browser: Any, num_points: int, folder: Path) -> str:
     path = folder / "tee.ply"
     edgel.write(path, synth.scan(synth.tee(), num_points=num_points).cloud)
-    with running([str(path)]) as (server, session, page):
-        assert session.wait_idle(PATIENCE / 1000)
-        assert page.wait_idle(PATIENCE / 1000)
-        alone = in_server(session, page)
+    with running([str(path)]) as viewer:
+        assert viewer.session.wait_idle(PATIENCE / 1000)
+        assert viewer.page.wait_idle(PATIENCE / 1000)
+        server = in_server(viewer)
         tab = browser.new_page(viewport={"width": 1280, "height": 800})
         tab.set_default_timeout(PATIENCE)
-        tab.goto(f"http://127.0.0.1:{server.get_port()}")
+        tab.goto(viewer.url)
         tab.locator(".edgel-pane", has_text="edge points shown").wait_for()
         tab.wait_for_timeout(3000)
-        counts, pictures, frame = in_browser(tab)
-        found = len(session.panes()[0].answer.edges)
+        seen = in_browser(tab)
+        answer = viewer.session.panes()[0].answer
+        assert answer is not None
+        assert answer.edges is not None
+        found = len(answer.edges)
         tab.close()
-    middle = [statistics.median(values) for values in (alone, counts, pictures)]
-    return f"| {num_points:,} | {found:,} | " + " | ".join(f"{value:.0f}" for value in (*middle, frame)) + " |"
+    times = (server, seen.count, seen.picture, seen.frame)
+    return f"| {num_points:,} | {found:,} | " + " | ".join(f"{value:.0f}" for value in times) + " |"
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""Pictures of the viewer on five clouds: docs/view/*.png, shown in docs/view.md.
+"""Pictures of the viewer on several clouds: docs/view/*.png, shown in docs/view.md.
 
 Run: python benchmarks/view_pictures.py [DATA [NAME...]] (default ../shared/data, all). Needs Chromium and Playwright, as the browser
 test does.
@@ -11,6 +11,7 @@ import sys
 import tempfile
 from collections.abc import Callable
 from contextlib import chdir
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from PIL import Image
 import edgel
 from edgel import synth
 from edgel._viewer.server import running
+from edgel._viewer.session import Session
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from browser import choose, chromium, input_of, picture, type_number
@@ -29,18 +31,27 @@ SIZE = {"width": 1280, "height": 800}
 PATIENCE = 90_000  # ms: without a GPU, and beside other work, a frame of a large cloud may take seconds
 
 
-def shoot(browser: Any, name: str, folder: Path, files: list[str], act: Callable[[Any, Any], None]) -> None:
-    with chdir(folder), running(files) as (server, session, _):  # so that the page shows the names alone
-        session.wait_idle(PATIENCE / 1000)  # before the browser takes what power there is
+@dataclass(frozen=True)
+class Shot:
+    """Files of a folder, and what is done on their page before the picture is taken."""
+
+    folder: Path
+    files: list[str]
+    act: Callable[[Any, Session], None]
+
+
+def shoot(browser: Any, name: str, shot: Shot) -> None:
+    with chdir(shot.folder), running(shot.files) as viewer:  # so that the page shows the names alone
+        viewer.session.wait_idle(PATIENCE / 1000)  # before the browser takes what power there is
         page = browser.new_page(viewport=SIZE)
         page.set_default_timeout(PATIENCE)
-        page.goto(f"http://127.0.0.1:{server.get_port()}")
+        page.goto(viewer.url)
         page.locator(".edgel-pane", has_text="found in").first.wait_for()
         close = page.locator(".mantine-Notification-closeButton")  # viser's remark that this browser has no GPU
         if close.count():
             close.first.click()
-        act(page, session)
-        session.wait_idle(PATIENCE / 1000)
+        shot.act(page, viewer.session)
+        viewer.session.wait_idle(PATIENCE / 1000)
         page.mouse.move(SIZE["width"] - 20, SIZE["height"] - 10)
         settle(page)
         picture_of_page = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
@@ -63,7 +74,7 @@ def settle(page: Any) -> None:
         before = after
 
 
-def click_edge(page: Any, _session: Any) -> None:
+def click_edge(page: Any, _session: Session) -> None:
     """Click an edge point in the middle of the picture."""
     settle(page)
     seen = picture(page)
@@ -76,26 +87,26 @@ def click_edge(page: Any, _session: Any) -> None:
     page.locator(".edgel-code").scroll_into_view_if_needed()
 
 
-def nothing(_page: Any, _session: Any) -> None:
+def nothing(_page: Any, _session: Session) -> None:
     pass
 
 
-def side_by_side(page: Any, session: Any) -> None:
+def side_by_side(page: Any, session: Session) -> None:
     choose(page, "Method", "side by side")
     page.get_by_text("edge map").first.wait_for()
     session.wait_idle(PATIENCE / 1000)
 
 
-def segments(page: Any, _session: Any) -> None:
+def segments(page: Any, _session: Session) -> None:
     input_of(page, "Tangents").click()
     input_of(page, "Normals").click()
 
 
-def by_height(page: Any, _session: Any) -> None:
+def by_height(page: Any, _session: Session) -> None:
     choose(page, "Color cloud by", "height")
 
 
-def at_scale(page: Any, session: Any) -> None:
+def at_scale(page: Any, session: Session) -> None:
     type_number(page, "Scale", 3)
     session.wait_idle(PATIENCE / 1000)
 
@@ -105,18 +116,18 @@ def main() -> None:
     DOCS.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as made, chromium() as browser:
         edgel.write(Path(made) / "tee.ply", synth.scan(synth.tee(), num_points=200_000).cloud)
-        pictures = {
-            "tee": (Path(made), ["tee.ply"], nothing),
-            "tee-side-by-side": (Path(made), ["tee.ply"], side_by_side),
-            "depth-frame": (data / "kinect_objects", ["learn0.pcd"], nothing),
-            "lidar-sweep": (data / "lidar_sweeps", ["small_gicp_target.ply"], at_scale),
-            "airborne": (data / "airborne", ["autzen_trim.laz"], by_height),
-            "part": (data / "truth", ["abc_7010.ply"], segments),
-            "clicked": (data / "truth", ["abc_7010.ply"], click_edge),
-            "two-files": (data / "truth", ["abc_7010.ply", "abc_7029.ply", "gone.ply"], nothing),
+        shots = {
+            "tee": Shot(Path(made), ["tee.ply"], nothing),
+            "tee-side-by-side": Shot(Path(made), ["tee.ply"], side_by_side),
+            "depth-frame": Shot(data / "kinect_objects", ["learn0.pcd"], nothing),
+            "lidar-sweep": Shot(data / "lidar_sweeps", ["small_gicp_target.ply"], at_scale),
+            "airborne": Shot(data / "airborne", ["autzen_trim.laz"], by_height),
+            "part": Shot(data / "truth", ["abc_7010.ply"], segments),
+            "clicked": Shot(data / "truth", ["abc_7010.ply"], click_edge),
+            "two-files": Shot(data / "truth", ["abc_7010.ply", "abc_7029.ply", "gone.ply"], nothing),
         }
-        for name in sys.argv[2:] or pictures:
-            shoot(browser, name, *pictures[name])
+        for name in sys.argv[2:] or shots:
+            shoot(browser, name, shots[name])
 
 
 if __name__ == "__main__":

@@ -148,84 +148,6 @@ def plane(neighbours):
     return normal, normal @ centre, (distances**2).sum(), s
 
 
-def planes_near(normals, planarity, points, distances, spacing, min_angle):
-    """Crease test 1 at the origin: angle between the two planes, 0 without a crease."""
-    score = planarity * np.exp(-((distances / (3 * spacing)) ** 2))
-    a = int(np.argmax(score))
-    cosines = np.abs(normals @ normals[a])
-    score = planarity * (1 - cosines) * np.exp(-((distances / (4 * spacing)) ** 2))
-    b = int(np.argmax(score))
-    off = max(abs(points[a] @ normals[a]), abs(points[b] @ normals[b]))
-    angle = math.acos(min(cosines[b], 1))
-    return angle if angle > min_angle and planarity[b] >= 0.3 and off < 0.35 * spacing else 0.0
-
-
-def planes_through(points, spacing, min_angle):
-    """Crease test 2 at the origin; the first of the points (nearest first) is the origin itself."""
-    tolerance = 0.15 * spacing
-
-    def best(rest, other):
-        winner, support = None, 0.0
-        for i in range(1, min(11, len(points))):
-            for j in range(i + 1, min(11, len(points))):
-                normal = np.cross(points[i], points[j])
-                area = np.linalg.norm(normal)
-                if area < 0.3 * spacing**2:
-                    continue
-                normal = normal / area
-                if other is not None and abs(normal @ other) > math.cos(min_angle):
-                    continue
-                off = np.abs(rest @ normal)
-                weight = (1 - 0.5 * off[off < tolerance] / tolerance).sum()
-                if weight > support + 1e-12:
-                    winner, support = normal, weight
-        return winner, support
-
-    a, _ = best(points[1:], None)
-    if a is None:
-        return 0.0
-    b, support = best(points[1:][np.abs(points[1:] @ a) >= tolerance], a)
-    if b is None or support < 4:
-        return 0.0
-    line = np.cross(a, b)
-    line = line / np.linalg.norm(line)
-    balances = []
-    for plane in (a, b):
-        across = points[1:][np.abs(points[1:] @ plane) < tolerance] @ np.cross(plane, line)
-        sides = (across > 0.4 * spacing).sum(), (across < -0.4 * spacing).sum()
-        balances.append(min(sides) / max(*sides, 1))
-    return math.acos(min(abs(a @ b), 1)) if min(balances) < 0.15 else 0.0
-
-
-def hinge(points, spacing, u, v, normal):
-    """Crease test 3 at the origin, in the frame u, v, normal: the turn of the hinge, 0 without a crease."""
-    radius = np.linalg.norm(points[-1]) * 1.0001
-    x, y, z = points @ u / radius, points @ v / radius, points @ normal / radius
-    weight = np.sqrt(1 - 0.8 * (points**2).sum(axis=1) / radius**2)
-
-    def fit(columns):
-        # A little is added to the diagonal of the normal equations: as many more rows of the least squares.
-        design = np.r_[np.column_stack(columns) * weight[:, None], 1e-3 * np.eye(len(columns))]
-        target = np.r_[z * weight, np.zeros(len(columns))]
-        solution = np.linalg.lstsq(design, target, rcond=None)[0]
-        # The squares that are left, less what the solution itself was charged for.
-        return ((design @ solution - target) ** 2).sum(), solution
-
-    one = np.ones_like(x)
-    smooth, _ = fit([one, x, y, x * x, x * y, y * y])
-    best = (math.inf, 0.0, 0.0)
-    for i in range(12):
-        c, s = math.cos(math.pi * i / 12), math.sin(math.pi * i / 12)
-        t, w = c * x + s * y, c * y - s * x
-        for j in range(13):
-            o = (j - 6) * 0.9 / 12
-            left, f = fit([one, t, w, np.abs(t - o)])
-            if left < best[0] - 1e-15:
-                best = (left, abs(math.atan(f[1] + f[3]) - math.atan(f[1] - f[3])), o)
-    left, angle, o = best
-    return angle if angle > math.radians(30) and abs(o) * radius < 0.35 * spacing and left < smooth else 0.0
-
-
 def nearest_points(pixels, depth, points):
     """Row of the point each pixel shows: the nearest, of equally near ones that of smallest coordinates."""
     shown = {}
@@ -427,7 +349,7 @@ def chains_kept(values, weak, least, threshold):
 
 
 def two_planes_through(points, spanning, inlier, least_angle):
-    """The best supported plane through the origin (row 0) and the best that differs: their angle and support."""
+    """The best supported plane through the origin (row 0) and the best that differs, by the names of the features."""
 
     def best(votes, other):
         answer, most = None, 0.0
@@ -447,8 +369,74 @@ def two_planes_through(points, spanning, inlier, least_angle):
         return answer, most
 
     a, first = best(points[1:], None)
+    found = {"angle": 0.0, "first_support": first, "second_support": 0.0, "first_balance": 1.0, "second_balance": 1.0}
     if a is None:
-        return 0.0, 0.0, 0.0
-    rest = points[1:][np.abs(points[1:] @ a) >= inlier]
-    b, second = best(rest, a)
-    return (0.0 if b is None else math.acos(min(abs(a @ b), 1))), first, second
+        return found
+    b, found["second_support"] = best(points[1:][np.abs(points[1:] @ a) >= inlier], a)
+    if b is not None:
+        found["angle"] = math.acos(min(abs(a @ b), 1))
+        found["first_balance"] = balance(points[1:], a, b, inlier)
+        found["second_balance"] = balance(points[1:], b, a, inlier)
+    return found
+
+
+def plane_scale(points, spacing):
+    """Features of the plane fitted to the neighbours of a point at the origin (row 0), by name."""
+    normal, variation, roundness = covariance_plane(points)
+    centroid, deviation = points.mean(axis=0), math.sqrt(points.var(axis=0).sum())
+    off = abs(centroid @ normal)
+    smallest = math.sqrt(max(np.linalg.eigvalsh(np.cov(points.T, bias=True))[0], 0))
+    return {
+        "variation": math.log(variation + 1e-6),
+        "roundness": roundness,
+        "off_plane": off / deviation,
+        "off_centre": math.sqrt(max(centroid @ centroid - off**2, 0)) / deviation,
+        "off_spread": min(off / (smallest + 0.01 * deviation), 4),
+        "reach": np.linalg.norm(points, axis=1).max() / spacing,
+    }
+
+
+def two_planes(hinge, points, spacing):
+    """Features of two planes (a dict of the parts of a hinge) fitted to the neighbours of a point at the origin."""
+    a, b, line, foot = (hinge[name] for name in ("first_normal", "second_normal", "line", "foot"))
+    radius, count = np.linalg.norm(points, axis=1).max(), len(points)
+    first = points @ hinge["parting"][:3] > hinge["parting"][3]
+    sides = [points[first], points[~first]]
+    left = [plane_residual(side) for side in sides]
+    logs = [
+        math.log(math.sqrt(squares / count) / spacing + 0.01)
+        for squares in (plane_residual(points), quadric_residual(points), sum(left))
+    ]
+    along = [(side - foot) @ line for side in sides]
+    across = [np.linalg.norm(side - foot - far[:, None] * line, axis=1) for side, far in zip(sides, along, strict=True)]
+    beside = np.concatenate(along)[np.concatenate(across) < 1.5 * spacing]
+    margins = []
+    for step in (-0.6, -0.3, 0, 0.3, 0.6):
+        place = foot + step * spacing * line
+        others = np.linalg.norm(points[1:16] - place, axis=1)
+        margins.append(np.linalg.norm(place) - others.min())
+    away = np.linalg.norm(foot) / spacing
+    return {
+        "one_plane": logs[0],
+        "quadric": logs[1],
+        "two_planes": logs[2],
+        "turn": math.acos(min(abs(a @ b), 1)),
+        "smaller_side": min(map(len, sides)) / count,
+        "foot_away": min(away, 4),
+        "off_first": min(abs(a @ foot) / spacing, 4),
+        "off_second": min(abs(b @ foot) / spacing, 4),
+        "near_sides": min(max(side.min() for side in across) / spacing, 4),
+        "far_sides": min(side.max() for side in across) / radius,
+        "along": min(max(-beside.min(), 0), max(beside.max(), 0)) / radius,
+        "margin": min(min(margins) / spacing, 2) if away < 3 else 2,
+        "quadric_gain": logs[2] - logs[1],
+    }
+
+
+def balance(points, normal, other, inlier):
+    """Inliers of a plane through the origin on the emptier side of its line with another, over the fuller."""
+    line = np.cross(normal, other)
+    across = np.cross(normal, line / np.linalg.norm(line))
+    beside = points[np.abs(points @ normal) < inlier] @ across
+    sides = (beside > 0.4).sum(), (beside < -0.4).sum()
+    return min(sides) / max(*sides, 1)

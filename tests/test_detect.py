@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import edgel
 from edgel import EdgeKind
-from edgel._detect import DEFAULT_KINDS, EVEN, strength
+from edgel._labels import EVEN, strength_of_probability
 
 
 def box(spacing=0.02, seed=0):
@@ -160,12 +160,10 @@ def test_three_points_and_repeats_are_answered():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"preset": "best"}, "preset"),
-        ({"preset": "paper", "viewpoint": [0, 0, 1]}, "viewpoint.*preset"),
-        ({"preset": "paper", "kinds": "crease"}, "kinds: the paper.*preset"),
-        ({"preset": "paper", "method": "surface"}, "method: the paper.*preset"),
-        ({"preset": "paper", "min_strength": 0.2}, "min_strength: the paper.*edgel.paper.detect"),
         ({"method": "best"}, "method: expected one of auto"),
+        ({"method": "paper"}, "method: .*published method is edgel.paper.detect"),
+        ({"scale": 0.5}, "scale: expected 1"),
+        ({"scale": np.nan}, "scale: expected 1"),
         ({"min_strength": 0}, "min_strength: expected a number above 0"),
         ({"min_strength": 1.5}, "min_strength: expected a number above 0"),
         ({"kinds": "sharp"}, "kinds: 'sharp' is unknown; choose from boundary"),
@@ -182,11 +180,6 @@ def test_wrong_options_are_named(options, message):
 def test_names_of_kinds_are_names():
     with pytest.raises(TypeError, match="kinds: expected EdgeKind flags or names"):
         edgel.detect(box(0.1), kinds=[8])  # pyright: ignore[reportArgumentType]
-
-
-def test_the_published_method_takes_the_defaults_of_the_options_it_has_not():
-    found = edgel.detect(box(0.1), preset="paper", kinds=DEFAULT_KINDS, method="auto")
-    assert found.method == "paper"
 
 
 def test_only_the_kinds_asked_for_are_answered():
@@ -228,5 +221,5 @@ def test_one_half_is_where_the_expected_f1_is_greatest():
         chance = 1 / (1 + np.exp(-sharpness * rng.normal(-2, 2, 3000)))
         scores = [2 * chance[chance >= t].sum() / ((chance >= t).sum() + chance.sum()) for t in chance]
         best = np.clip(chance[np.argmax(scores)], *EVEN)
-        assert np.mean((strength(chance) >= 0.5) != (chance >= best)) <= 1 / 3000
-    assert (strength(np.full(10, 0.05)) < 0.5).all()  # a cloud without edges has none
+        assert np.mean((strength_of_probability(chance) >= 0.5) != (chance >= best)) <= 1 / 3000
+    assert (strength_of_probability(np.full(10, 0.05)) < 0.5).all()  # a cloud without edges has none

@@ -37,7 +37,6 @@ def edges_of_three(kind=(EdgeKind.CREASE, EdgeKind.BOUNDARY | EdgeKind.CREASE, E
         convex=np.array([1, -1, 0], np.int8),
         num_points=5,
         num_dropped=1,
-        preset="default",
         method="surface",
         reason="",
         parameters={},
@@ -154,7 +153,7 @@ def test_every_format_keeps_what_is_known_of_the_edges(tmp_path, suffix, whole):
 @pytest.mark.parametrize("suffix", [".ply", ".pcd", ".las", ".xyz", ".npz"])
 def test_no_edges_can_be_written_too(tmp_path, suffix):
     none = edges_of_three().of_kinds("color")
-    edgel.write(tmp_path / f"a{suffix}", none.cloud(cloud_of_five()))
+    edgel.write(tmp_path / f"a{suffix}", none.to_cloud(cloud_of_five()))
     found = edgel.read(tmp_path / f"a{suffix}")
     assert len(found) == 0
     assert {*LABELS, *MORE} <= set(found.attributes)

@@ -8,15 +8,15 @@ from typing import Any, Literal
 import numpy as np
 
 from edgel._color import color_channels, color_edges
-from edgel._labels import LIKELY, Labels, strength_of_contrast, strength_of_probability
-from edgel._neighbors.candidates import at_points
+from edgel._labels import LIKELY, label_edges, strength_of_contrast
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.normals import check_num_neighbors, fit_planes, towards
-from edgel._range_image import METHODS, choose_view, outlines
+from edgel._neighbors.queries import at_points
+from edgel._range_image import METHODS, choose_view
 from edgel._scale import at_scale, check_scale
 from edgel._stages import Stages
 from edgel._surface import classify, cloud_statistics, localize, screen
-from edgel.cloud import as_cloud, as_vector, check_points
+from edgel.cloud import Cloud, Points, as_cloud, as_vector, check_points
 from edgel.edges import EdgeKind, Edges, as_kinds
 
 DEFAULT_KINDS = EdgeKind.BOUNDARY | EdgeKind.OCCLUDING | EdgeKind.OCCLUDED | EdgeKind.CREASE
@@ -89,47 +89,33 @@ def detect(
     viewpoint = cloud.viewpoint if viewpoint is None else as_vector(viewpoint, "viewpoint")
     finite = check_points(cloud)
     xyz, k = finite.xyz, check_num_neighbors(num_neighbors, len(finite.xyz))
-    colors = _channels(cloud, kinds)
+    colors = _channels(cloud, finite) if EdgeKind.COLOR in kinds else None
 
     with stages("index"):
         index = build_index(xyz)
     with stages("screening"):
-        statistics = cloud_statistics(index)
-        if not statistics.has_surface:
-            raise ValueError("points: all lie on one line or spot, so there is no surface whose edges could be found")
-        screening = screen(index, statistics)
+        screening = screen(index, cloud_statistics(index))
     with stages("view"):
         view = choose_view(cloud, finite, index, method, viewpoint)
     with stages("classification"):
         classified = classify(index, screening)
-    labels = Labels(len(xyz))
     with stages("labels"):
-        labels.add(classified.points, EdgeKind.CREASE, strength_of_probability(classified.crease))
-        if view.image is None:
-            labels.add(classified.points, EdgeKind.BOUNDARY, strength_of_probability(classified.outline))
-        else:
-            outline = outlines(view.image, xyz)
-            labels.add(np.arange(len(xyz)), outline.kind, outline.strength)
+        labels = label_edges(classified, view, xyz)
     if colors is not None:
         with stages("color"):
-            contrast = color_edges(index, xyz, screening.normals_of_points(index), colors[finite.rows]).strength
+            contrast = color_edges(index, xyz, screening.normals_of_points(index), colors).strength
             labels.add(np.arange(len(xyz)), EdgeKind.COLOR, strength_of_contrast(contrast))
     with stages("localisation"):
         kind = labels.of(kinds, min_strength)
         edge = np.flatnonzero(kind)
         planes = towards(fit_planes(index, at_points(index, edge), k), xyz[edge], viewpoint)
-        creases = classified.take(np.flatnonzero(kind[classified.points] & EdgeKind.CREASE))
-        faces = localize(creases.evidence, xyz[creases.points], viewpoint)
-        faces = faces.spread(edge, creases.points, xyz[edge], planes.normals)
+        creases = classified.take((kind[classified.points] & EdgeKind.CREASE) > 0)
+        faces = localize(creases, edge, xyz, planes.normals, viewpoint)
     return Edges(
         index=finite.rows[edge],
         kind=kind[edge],
         strength=labels.strength[edge],
-        position=faces.position,
-        direction=faces.direction,
-        normals=faces.normals,
-        angle=faces.angle,
-        convex=faces.convex,
+        **vars(faces),
         num_points=finite.num_input,
         num_dropped=finite.num_dropped,
         method=view.method,
@@ -150,11 +136,9 @@ def _check_options(method: str, min_strength: float, scale: float) -> None:
     check_scale(scale)
 
 
-def _channels(cloud: Any, kinds: EdgeKind) -> np.ndarray | None:
-    """Return the colors of a cloud (N, C) if color edges are wanted."""
-    if EdgeKind.COLOR not in kinds:
-        return None
+def _channels(cloud: Cloud, finite: Points) -> np.ndarray:
+    """Return the colors of the finite points of a cloud, (N, C)."""
     channels = color_channels(cloud)
     if channels is None:
         raise ValueError("kinds: color edges need red, green and blue or an intensity, and the cloud carries neither")
-    return channels
+    return channels[finite.rows]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from edgel._range_image import View, outlines
+from edgel._surface import Classification
 from edgel.edges import EdgeKind
 
 LIKELY = 0.5  # strength of an edge that is as likely as not
@@ -33,6 +35,18 @@ class Labels:
     def of(self, kinds: EdgeKind, min_strength: float) -> np.ndarray:
         """Return the kinds (N,) uint8 among those wanted, of the points that have the least strength or more."""
         return np.where(self.strength >= min_strength, self.kind & np.uint8(kinds), np.uint8(0))
+
+
+def label_edges(classified: Classification, view: View, xyz: np.ndarray) -> Labels:
+    """Label the points (N, 3): creases by the surface, its outline by the view where there is one."""
+    labels = Labels(len(xyz))
+    labels.add(classified.points, EdgeKind.CREASE, strength_of_probability(classified.crease))
+    if view.image is None:
+        labels.add(classified.points, EdgeKind.BOUNDARY, strength_of_probability(classified.outline))
+    else:
+        outline = outlines(view.image, xyz)
+        labels.add(np.arange(len(xyz)), outline.kind, outline.strength)
+    return labels
 
 
 def strength_of_probability(probability: np.ndarray) -> np.ndarray:

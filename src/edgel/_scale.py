@@ -40,7 +40,7 @@ def at_scale(
     points, progress
         As it takes them.
     scale : float
-        Side of the voxels, in median spacings, 1 or more. At 1 the cloud is not thinned.
+        Side of the voxels, in median spacings, above 1.
     **options
         Of the detector.
 
@@ -58,10 +58,7 @@ def at_scale(
     >>> bool((abs(roof[edges.index, 0] - 30) < 2).all()), edges.num_points
     (True, 3600)
     """
-    check_scale(scale)
     cloud, stages = as_cloud(points), Stages(progress)
-    if scale == 1:
-        return find(cloud, progress=progress, **options)
     with stages("thinning"):
         rows = thin(cloud, scale * median_spacing(cloud))
     edges = find(cloud.take(rows), progress=progress, **options)

@@ -167,7 +167,7 @@ class Edges:
         return cloud.with_attributes(**columns)
 
     def label(self, points: Any) -> Cloud:
-        """Return the whole input with ``edge_kind edge_strength edge_angle edge_convex nx ny nz``, as `to_cloud` has them.
+        """Return the whole input with the first columns of `to_cloud`: what is known of the edge, and ``nx ny nz``.
 
         Where there is no edge the first two and ``edge_convex`` are 0, the others NaN.
         """

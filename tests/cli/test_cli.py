@@ -18,12 +18,15 @@ import edgel
 from edgel import io
 from edgel._cli import app
 from edgel._cli.convert import differences
-from edgel._cli.detect import arguments, detect, summary
+from edgel._cli.detect import detect
+from edgel._cli.methods import arguments
+from edgel._cli.options import METHODS
 from edgel._cli.output import print_json
 from edgel._cli.progress import COMPILING, Watch
+from edgel._cli.summary import summary
 
 RUNNER = CliRunner(env={"COLUMNS": "200"})
-PAPER = ("--preset", "paper")
+PAPER = ("--method", "paper")
 
 
 def run(*words):
@@ -35,8 +38,8 @@ def run(*words):
 
 
 def program(*words, stdin=None, cwd=None):
-    """Run the installed program as a shell would."""
-    command = [sys.executable, "-c", "from edgel._cli import app; app()", *map(str, words)]
+    """Run the program as a shell would."""
+    command = [sys.executable, "-m", "edgel", *map(str, words)]
     return subprocess.run(command, input=stdin, capture_output=True, cwd=cwd, timeout=120, check=False)
 
 
@@ -141,7 +144,8 @@ def test_detect_json(scan, tmp_path):
     ].items()
     assert {"reading", "canny", "normals", "writing"} < set(found["seconds"])
     assert found["output"] == str(tmp_path / "edges.ply")
-    assert {"input", "report", "preset", "normals_undefined", "peak_memory_bytes"} < set(found)
+    assert {"input", "report", "normals_undefined", "peak_memory_bytes"} < set(found)
+    assert "preset" not in found
     assert (found["method"], found["reason"]) == ("paper", "the published method looks along Z")
     assert found["creases"] == {"median_angle_degrees": None, "convex": 0, "concave": 0}
 
@@ -162,7 +166,7 @@ def test_detect_at_a_scale_of_sharp_creases_in_a_box(scan, tmp_path):
     result = run("detect", scan, "-o", tmp_path / "edges.npz", "--json", *words)
     assert result.exit_code == 0
     cloud = io.read(scan)
-    expected = edgel.detect_at_scale(cloud, 2.0).drop_blunt(np.radians(20))
+    expected = edgel.detect(cloud, scale=2).drop_blunt(np.radians(20))
     expected = expected.take(cloud.xyz[expected.index, 1] <= 0.5)
     assert np.array_equal(io.read(tmp_path / "edges.npz").attributes["label"], expected.index)
     told = json.loads(result.stdout)
@@ -176,14 +180,56 @@ def test_detect_at_a_scale_of_sharp_creases_in_a_box(scan, tmp_path):
         (("--kinds", "sharp"), "--kinds: 'sharp' is unknown; choose from boundary, occluding"),
         (("--kinds", ","), "--kinds: none is asked for"),
         (("--method", "best"), "--method: 'best' is unknown; choose from auto, surface"),
-        (("--kinds", "crease", *PAPER), "--kinds: not an option of the paper preset; add --preset default"),
-        (("--method", "surface", *PAPER), "--method: not an option of the paper preset; add --preset default"),
+        (("--method", "default"), "--method: 'default' is unknown; choose from auto, surface"),
+        (
+            ("--kinds", "crease", *PAPER),
+            "--kinds: the published method has no such option; leave it out, or --method paper",
+        ),
+        (
+            (*PAPER, "--viewpoint", "0", "0", "1", "--min-strength", "0.5"),
+            "--min-strength, --viewpoint: the published method has no such option; leave them out, or --method paper",
+        ),
+        (("--sigma", "2"), "--sigma: an option of the published method; add --method paper, or leave it out"),
+        (
+            ("--method", "surface", "--low", "1", "--high", "2"),
+            "--low, --high: options of the published method; add --method paper, or leave them out",
+        ),
+        ((*PAPER, "--min-angle", "30"), "--min-angle: the published method tells no creases apart; leave it out"),
+        (("--preset", "paper"), "--preset: no such option; the published method is --method paper"),
+        (("--preset=paper",), "--preset: no such option; the published method is --method paper"),
     ],
 )
 def test_detect_names_wrong_kinds_and_methods(scan, words, message):
     result = run("detect", scan, *words)
     assert result.exit_code == 2
-    assert message in result.stderr
+    assert result.stderr.startswith(f"edgel: {message}")
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_render_refuses_what_a_method_has_not(scan, tmp_path):
+    for words in ((*PAPER, "--kinds", "crease"), ("--method", "best"), ("--preset", "paper")):
+        result = run("render", scan, "-o", tmp_path / "picture.png", *words)
+        assert result.exit_code == 2
+        assert result.stderr.startswith(f"edgel: {words[-2]}: ")
+    assert not (tmp_path / "picture.png").exists()
+
+
+def test_the_published_method_at_a_scale(scan, tmp_path):
+    result = run("detect", scan, "-o", tmp_path / "edges.npz", "--json", *PAPER, "--scale", 2, "--sigma", 1)
+    assert result.exit_code == 0
+    told = json.loads(result.stdout)
+    expected = edgel.paper.detect(io.read(scan), scale=2, sigma=1)
+    assert np.array_equal(io.read(tmp_path / "edges.npz").attributes["label"], expected.index)
+    assert (told["method"], told["points"], told["parameters"]["scale"]) == ("paper", 2500, 2)
+    assert {"thinning", "canny"} < set(told["seconds"])
+    assert run("detect", scan, *PAPER, "--scale", 0.5).exit_code == 2
+
+
+@pytest.mark.parametrize("method", ["surface", "orthographic"])
+def test_detect_by_a_method_says_so(scan, method):
+    told = json.loads(run("detect", scan, "--json", "--method", method).stdout)
+    assert told["method"] == method
+    assert told["edge_points"] == len(edgel.detect(io.read(scan), method=method))
 
 
 def test_the_summary_tells_what_is_known_of_the_creases():
@@ -209,10 +255,10 @@ def test_detect_report(scan, tmp_path):
     assert run("detect", scan, "--report", "/proc/report").exit_code == 5
 
 
-def test_the_report_compares_the_presets_and_links_to_the_files(scan, tmp_path):
+def test_the_report_compares_the_methods_and_links_to_the_files(scan, tmp_path):
     run("detect", scan, "-o", tmp_path / "edges.ply", "--report", tmp_path / "report")
     page = (tmp_path / "report" / "report.html").read_text()
-    assert "Both presets" in page
+    assert "Both methods" in page
     assert 'href="../edges.ply"' in page
     assert f'href="{os.path.relpath(scan, tmp_path / "report")}"' in page
 
@@ -223,7 +269,7 @@ def test_a_report_of_what_the_paper_cannot_look_at_has_nothing_to_compare(tmp_pa
     assert run("detect", tmp_path / "wall.ply", "--report", tmp_path / "report").exit_code == 0
     page = (tmp_path / "report" / "report.html").read_text()
     assert "of kind boundary" in page
-    assert "Both presets" not in page
+    assert "Both methods" not in page
 
 
 def test_a_cloud_that_is_all_edges_is_remarked(scan):
@@ -232,7 +278,7 @@ def test_a_cloud_that_is_all_edges_is_remarked(scan):
 
 def test_every_argument_of_the_detectors_is_an_option_and_its_default_is_shown():
     names = set(inspect.signature(detect).parameters)
-    assert (arguments("default") | arguments("paper")) - {"progress"} <= names
+    assert arguments("auto") | arguments("paper") <= names
     page = RUNNER.invoke(app, ["detect", "--help"]).stdout
     for option, default in (
         ("--sigma", "1.4"),
@@ -352,7 +398,7 @@ def test_pipes(scan):
 
 def test_a_pipe_that_closes_early_is_told_without_a_traceback(tmp_path):
     io.write(tmp_path / "a.npy", edgel.Cloud(np.random.default_rng(0).random((500_000, 3))))
-    command = [sys.executable, "-c", "from edgel._cli import app; app()", "convert", "a.npy", "-"]
+    command = [sys.executable, "-m", "edgel", "convert", "a.npy", "-"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=tmp_path) as process:
         assert process.stdout is not None
         assert process.stderr is not None
@@ -389,10 +435,10 @@ def test_input_that_cannot_be_read(bad, tmp_path, name):
         assert not out.exists()
 
 
-@pytest.mark.parametrize("preset", ["default", "paper"])
+@pytest.mark.parametrize("method", ["auto", "paper"])
 @pytest.mark.parametrize("name", ["one.xyz", "two.xyz", "same.xyz", "line.xyz", "nan.xyz"])
-def test_data_that_cannot_be_processed(bad, tmp_path, name, preset):
-    result = run("detect", bad(name), "-o", tmp_path / "out.ply", "--preset", preset)
+def test_data_that_cannot_be_processed(bad, tmp_path, name, method):
+    result = run("detect", bad(name), "-o", tmp_path / "out.ply", "--method", method)
     assert result.exit_code == 4
     assert name in result.stderr
     assert not (tmp_path / "out.ply").exists()
@@ -439,7 +485,7 @@ def test_output_that_a_format_cannot_hold(tmp_path):
         ["--sigma", "2"],
         ["--low", "1", "--high", "2"],
         [*PAPER, "--viewpoint", "0", "0", "1"],
-        ["--preset", "other"],
+        ["--method", "other"],
         ["--all"],
         ["--json", "-o", "-"],
         ["--num-neighbors", "2"],
@@ -476,12 +522,24 @@ def test_demo(tmp_path):
 
 def test_no_command_shows_help():
     assert "detect" in run().output
-    assert run("--version").stdout.startswith("edgel 0.")
+    assert run("--version").stdout == f"edgel {edgel.__version__}\n"
     for command in ("detect", "normals", "info", "convert", "render", "demo"):
         page = run(command, "--help").stdout
         assert f"edgel {command}" in page
         assert "Examples:" in page
         assert "Exit codes" in page
+        assert "preset" not in page
+
+
+def test_python_runs_the_package():
+    result = program("--version")
+    assert (result.returncode, result.stdout.decode().split()) == (0, ["edgel", edgel.__version__])
+
+
+def test_help_names_every_method():
+    for command in ("detect", "render"):
+        page = run(command, "--help").stdout
+        assert all(name in page for name in METHODS)
 
 
 @pytest.mark.parametrize(

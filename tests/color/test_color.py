@@ -7,19 +7,20 @@ import numpy as np
 import pytest
 
 import edgel
-from edgel.cloud import Cloud, check_points
 from edgel._color import color_channels, color_edges
-from edgel._color.chains import thin
+from edgel._color.chains import non_maximum_suppression
 from edgel._color.gradient import color_gradient
 from edgel._color.step import _peak
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.normals import fit_planes
+from edgel._neighbors.queries import every_place, every_point
+from edgel.cloud import Cloud, check_points
 
 
 def find(points, channels, **options):
     index = build_index(points)
-    return color_edges(index, points, fit_planes(index, index, 16).normals, channels, **options)
+    return color_edges(index, points, fit_planes(index, every_point(index), 16).normals, channels, **options)
 
 
 def sheet(kind="jittered", size=60, seed=0):
@@ -85,9 +86,9 @@ def test_gradient_is_that_of_the_oracle(count):
     points = ball(8.0) + np.random.default_rng(0).normal(0, 0.1, (804, 3))
     colors = np.random.default_rng(1).random((len(points), count))
     index, k = build_index(points), 20
-    normals = fit_planes(index, index, k).normals
+    normals = fit_planes(index, every_point(index), k).normals
     gradients = np.zeros((len(points), 4))
-    visit_neighbors(color_gradient, index, index, k, normals[index.order], colors[index.order], gradients)
+    visit_neighbors(color_gradient, every_place(index), index, k, normals[index.order], colors[index.order], gradients)
     for place in range(0, len(points), 13):
         row = index.order[place]
         near = naive.nearest(points.tolist(), points[row].tolist(), k)
@@ -118,7 +119,7 @@ def test_thinning_is_that_of_the_oracle():
     # Few abreast of each: the kernel looks at no more than twelve neighbours.
     points = np.c_[np.arange(300) * 0.6, rng.uniform(-0.75, 0.75, 300), rng.normal(0, 0.05, 300)]
     across = np.tile([0.0, 1.0, 0.0], (300, 1))
-    kept = thin(points, across, np.ones(300), -points[:, 1])
+    kept = non_maximum_suppression(points, across, np.ones(300), -points[:, 1])
     assert sorted(np.flatnonzero(kept)) == sorted(naive.thin_abreast(points, across, np.ones(300), -points[:, 1]))
     assert 100 < kept.sum() < 300
 

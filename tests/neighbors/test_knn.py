@@ -6,8 +6,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial import KDTree
 
-from edgel._neighbors.kdtree import BUCKET, bounds, build_index, node_start
+from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import knn
+from edgel._neighbors.queries import at_places, at_points, every_place, every_point
 
 # Few different coordinates, so that ties and duplicates are the rule.
 LATTICE = arrays(np.float64, st.tuples(st.integers(1, 60), st.just(3)), elements=st.integers(-3, 3).map(float))
@@ -115,24 +116,28 @@ def test_number_of_threads_is_checked(monkeypatch):
         build_index(cloud("uniform"))
 
 
-@pytest.mark.parametrize("n", [1, 2, 16, 17, 65, 70_001])
-def test_index_holds_every_point_once_and_its_boxes_hold_the_points(n):
-    points = cloud("uniform", n)
-    index = build_index(points)
-    assert sorted(index.order.tolist()) == list(range(n))
-    np.testing.assert_array_equal(index.xyz.T, points[index.order])
-    lower, upper = bounds(points)
-    np.testing.assert_array_equal(lower, points.min(axis=0))
-    np.testing.assert_array_equal(upper, points.max(axis=0))
-    leaves = len(index.boxes) // 2
-    for leaf in np.random.default_rng(0).integers(0, leaves, 20):
-        inside = index.xyz[:, node_start(leaf, n, leaves) : node_start(leaf + 1, n, leaves)]
-        assert 0 < inside.shape[1] <= BUCKET
-        np.testing.assert_array_equal(index.boxes[leaves + leaf], np.r_[inside.min(axis=1), inside.max(axis=1)])
-    np.testing.assert_array_equal(index.boxes[1], np.r_[lower, upper])
-
-
 @pytest.mark.parametrize("k", [0, 4])
 def test_more_neighbours_than_points_are_refused(k):
     with pytest.raises(ValueError, match="num_neighbors: expected 1 to 3"):
         knn(build_index(np.eye(3)), np.eye(3), k)
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([1, 7, 8, 9, 300, 2000]))
+def test_queries_in_the_order_of_the_index_are_answered_as_any(seed, some):
+    """Queries that are the index's own points need no tree of their own, and change no bit."""
+    rng = np.random.default_rng(seed)
+    points = cloud(KINDS[seed % len(KINDS)], 2000, seed)
+    index = build_index(points)
+    chosen = rng.permutation(len(points))[:some]
+    expected = knn(index, points[chosen], 5)
+    places = np.sort(chosen)
+    asked = {
+        "at_points": (at_points(index, chosen), expected),
+        "at_places": (at_places(index, places), knn(index, index.at(places), 5)),
+        "every_point": (every_point(index), knn(index, points, 5)),
+        "every_place": (every_place(index), knn(index, index.at(np.arange(len(index))), 5)),
+    }
+    for name, (queries, wanted) in asked.items():
+        found = knn(index, queries, 5)
+        np.testing.assert_array_equal(found.points, wanted.points, err_msg=name)
+        np.testing.assert_array_equal(found.distances, wanted.distances, err_msg=name)

@@ -1,12 +1,10 @@
 import naive
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.spatial import KDTree
 
 import edgel
-from edgel._neighbors.normals import by_offset, smallest_eigenpair
+from edgel._neighbors.normals import by_offset
 
 
 def surface(n=2000, seed=0, noise=0.01):
@@ -132,17 +130,3 @@ def test_fewer_points_than_neighbours_are_all_used():
 def test_wrong_options_are_named(options, error, message):
     with pytest.raises(error, match=message):
         edgel.estimate_normals(surface(), **options)
-
-
-@given(st.lists(st.floats(-1, 1), min_size=9, max_size=9), st.sampled_from([1e-6, 1.0, 1e6]))
-def test_eigenpair_is_that_of_lapack(entries, scale):
-    a = np.array(entries).reshape(3, 3) * scale
-    m = a @ a.T
-    smallest, middle, *vector = smallest_eigenpair(m[0, 0], m[0, 1], m[0, 2], m[1, 1], m[1, 2], m[2, 2])
-    values, vectors = np.linalg.eigh(m)
-    size = values[2] + 1e-300
-    assert abs(smallest - values[0]) < 1e-12 * size
-    assert abs(middle - values[1]) < 1e-6 * size  # only tells whether the neighbours span a plane
-    assert np.linalg.norm(vector) == pytest.approx(1)
-    if values[1] - values[0] > 1e-5 * size:
-        assert angle(np.array(vector), vectors[:, 0]) < 1e-6

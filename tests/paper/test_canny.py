@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from edgel.paper.canny import canny, gaussian_kernel, gradient, hysteresis, smooth, thin
+from edgel.paper.canny import canny, gaussian_kernel, gradient, hysteresis, non_maximum_suppression, smooth
 
 IMAGES = st.integers(0, 2**32 - 1).map(lambda seed: _random_image(np.random.default_rng(seed)))
 
@@ -32,7 +32,7 @@ def test_every_step_is_that_of_the_equations(image, kernel, low, ratio):
     naive_gx, naive_gy = naive.gradient(result.smooth)
     np.testing.assert_allclose(gx, naive_gx, atol=1e-9)
     np.testing.assert_allclose(gy, naive_gy, atol=1e-9)
-    thinned = thin(result.magnitude, gx, gy)
+    thinned = non_maximum_suppression(result.magnitude, gx, gy)
     np.testing.assert_array_equal(thinned, naive.non_maximum_suppression(gx, gy))
     np.testing.assert_array_equal(result.edges, naive.hysteresis(thinned, low, ratio * low))
 

@@ -95,7 +95,7 @@ def scan(request):
 
 
 def test_one_set_of_defaults_gives_about_ten_percent_of_both_parts(scan):
-    found = edgel.detect(scan.cloud, preset="paper")
+    found = paper.detect(scan.cloud)
     assert 0.08 <= found.share <= 0.12
     # They lie along true edges: outlines and rims, seen from above.
     edges = getattr(synth, scan.name.split("/")[0])().edges
@@ -162,8 +162,8 @@ def _plane(n):
 @pytest.mark.parametrize("dtype", [np.float64, np.float32, np.int32, np.uint16])
 def test_any_real_dtype_gives_the_same(dtype):
     points = np.round(_plane(3000) * 100)
-    expected = edgel.detect(points, preset="paper")
-    found = edgel.detect(points.astype(dtype), preset="paper")
+    expected = paper.detect(points)
+    found = paper.detect(points.astype(dtype))
     np.testing.assert_array_equal(found.index, expected.index)
     np.testing.assert_array_equal(found.normals, expected.normals)
 
@@ -228,7 +228,7 @@ BAD = {
 def test_bad_input_is_named_with_its_remedy(case):
     points, error, message = BAD[case]
     with pytest.raises(error, match=message):
-        edgel.detect(points, preset="paper")
+        paper.detect(points)
 
 
 @pytest.mark.parametrize(
@@ -269,7 +269,7 @@ def test_stages_are_timed_and_told():
 def test_edge_points_keep_every_attribute():
     points = _plane(3000)
     cloud = edgel.Cloud(points, {"intensity": np.arange(3000, dtype=np.uint16)}, crs="EPSG:25832")
-    found = edgel.detect(cloud, preset="paper")
+    found = paper.detect(cloud)
     only = found.to_cloud(cloud)
     np.testing.assert_array_equal(only.xyz, points[found.index])
     np.testing.assert_array_equal(only.attributes["intensity"], found.index)

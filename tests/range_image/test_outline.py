@@ -4,10 +4,10 @@ import naive
 import numpy as np
 import pytest
 
+from edgel._range_image.facets import _without_isolated, local_planes, noise_level
+from edgel._range_image.outline import Outline, beside_void, level_gaps, outlines
+from edgel._range_image.range_image import RangeImage, organized, orthographic
 from edgel.edges import EdgeKind
-from edgel._range_image.facets import _held, local_planes, noise_level
-from edgel._range_image.outline import Outline, beside_void, level_gaps, outline_kinds
-from edgel._range_image.range_image import Raster, organized, orthographic
 
 DOWN = np.array([0.0, 0.0, -1.0])
 RNG = np.random.default_rng(5)
@@ -23,7 +23,7 @@ def heights(z):
 
 def found(xyz):
     """What counts by default: strength of a half or more."""
-    outline = outline_kinds(orthographic(xyz, DOWN), xyz)
+    outline = outlines(orthographic(xyz, DOWN), xyz)
     sure = outline.strength >= 0.5
     return Outline(np.where(sure, outline.kind, 0), np.where(sure, outline.strength, 0))
 
@@ -114,7 +114,7 @@ def test_a_camera_sees_the_same():
     depth = 100 / (1 + 1.7 * rays[..., 0])
     plate = (abs(u - 50) <= 10) & (abs(v - 40) <= 12)
     xyz = (rays * np.where(plate, 50.0, depth)[..., None]).reshape(-1, 3)
-    kind = outline_kinds(organized(xyz, np.arange(len(xyz)), plate.shape), xyz).kind.reshape(plate.shape)
+    kind = outlines(organized(xyz, np.arange(len(xyz)), plate.shape), xyz).kind.reshape(plate.shape)
     assert np.array_equal(kind == EdgeKind.OCCLUDING, plate & ~((abs(u - 50) < 10) & (abs(v - 40) < 12)))
     around = ~plate & (((abs(u - 50) <= 11) & (abs(v - 40) <= 12)) | ((abs(u - 50) <= 10) & (abs(v - 40) <= 13)))
     assert np.array_equal(kind == EdgeKind.OCCLUDED, around)
@@ -147,7 +147,7 @@ def test_kernels_equal_naive():
     depth[RNG.random(depth.shape) < 0.1] = np.nan
     close = np.full(depth.shape, 1.5)
     kept = np.full(depth.shape, np.nan)
-    _held(0, len(depth), depth, close, kept)
+    _without_isolated(0, len(depth), depth, close, kept)
     assert np.array_equal(kept, naive.held(depth, close), equal_nan=True)
     known = np.flatnonzero(~np.isnan(depth))
     planes = local_planes(depth, np.full(depth.shape, 0.2), known, False, 3)
@@ -157,6 +157,6 @@ def test_kernels_equal_naive():
     assert np.array_equal(beside_void(np.where(hole, np.nan, 1.0)), naive.beside_void(hole))
 
 
-def test_an_empty_raster_has_no_edge():
-    nothing = Raster(np.full((5, 5), np.nan), np.full((5, 5), -1), "organized", (1.0, 1.0), None, DOWN, np.zeros(0))
-    assert len(outline_kinds(nothing, np.zeros((0, 3))).kind) == 0
+def test_an_empty_image_has_no_edge():
+    nothing = RangeImage(np.full((5, 5), np.nan), np.full((5, 5), -1), "organized", (1.0, 1.0), None, DOWN, np.zeros(0))
+    assert len(outlines(nothing, np.zeros((0, 3))).kind) == 0

@@ -1,12 +1,23 @@
 """The viewer in a real browser: Chromium, headless, driven by Playwright."""
 
 import importlib.util
-import re
-import time
 
 import numpy as np
 import pytest
-from browser import CHROMIUM, choose, chromium, input_of, picture, type_number
+from browser import (
+    CHROMIUM,
+    TIMEOUT,
+    choose,
+    chromium,
+    count_pixels,
+    input_of,
+    number_in,
+    picture,
+    set_slowly,
+    shown,
+    type_number,
+    wait_for,
+)
 
 import edgel
 from edgel import EdgeKind, synth
@@ -18,45 +29,12 @@ for needed in ("viser", "playwright"):
 if CHROMIUM is None:
     pytest.skip("chromium is not installed (apt install chromium)", allow_module_level=True)
 
-TIMEOUT = 60.0
-
 HOLD_FRAMES = """async () => {
     const draw = window.requestAnimationFrame.bind(window), held = [];
     window.requestAnimationFrame = callback => held.push(callback);
     window.release = () => { window.requestAnimationFrame = draw; held.forEach(draw); };
     await new Promise(draw);  // the frame asked for before
 }"""
-
-
-def wait_for(condition, what):
-    end = time.monotonic() + TIMEOUT
-    while time.monotonic() < end:
-        if condition():
-            return
-        time.sleep(0.05)
-    pytest.fail(f"waited in vain for {what}")
-
-
-def shown(page):
-    """The number of edge points that the page says it shows."""
-    return number_in(page.locator(".edgel-status").inner_text(), r"([\d,]+) edge points shown")
-
-
-def number_in(text, pattern):
-    found = re.search(pattern, text)
-    assert found is not None, text
-    return int(found[1].replace(",", ""))
-
-
-def set_slowly(page, values):
-    """Type numbers no faster than users can: of all that changes within 50 ms viser sends the last alone."""
-    for label, value in values.items():
-        type_number(page, label, value)
-        page.wait_for_timeout(100)
-
-
-def count_pixels(page, kind):
-    return int((abs(picture(page) - KIND_COLORS[kind]).max(axis=2) < 12).sum())
 
 
 @pytest.fixture(scope="module")
@@ -78,8 +56,8 @@ def served(folder, tee):
 
     damaged = folder / "<b>damaged.ply"
     damaged.write_bytes(tee.read_bytes()[:5000])
-    with running([str(tee), str(damaged)]) as (server, session, _):
-        yield f"http://127.0.0.1:{server.get_port()}", session
+    with running([str(tee), str(damaged)]) as viewer:
+        yield viewer
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +73,7 @@ def errors():
 
 @pytest.fixture(scope="module")
 def page(browser, served, errors):
-    return open_tab(browser, served[0], errors)
+    return open_tab(browser, served.url, errors)
 
 
 @pytest.fixture(autouse=True)
@@ -119,10 +97,10 @@ def test_slider_on_a_large_cloud(browser, folder, errors):
 
     path = folder / "large.ply"
     edgel.write(path, synth.scan(synth.tee(), num_points=647_984).cloud)
-    with running([str(path)]) as (server, session, _):
-        page = open_tab(browser, f"http://127.0.0.1:{server.get_port()}", errors)
+    with running([str(path)]) as viewer:
+        page = open_tab(browser, viewer.url, errors)
         assert "647,984 points" in page.locator(".edgel-status").inner_text()
-        answer = session.panes()[0].answer
+        answer = viewer.session.panes()[0].answer
         assert answer is not None
         assert answer.edges is not None
         strength = answer.edges.strength
@@ -138,7 +116,7 @@ def test_a_move_sends_the_edges_and_not_the_cloud(browser, served, errors):
     sizes = []
     page = browser.new_page(viewport={"width": 900, "height": 600})
     page.on("websocket", lambda socket: socket.on("framereceived", lambda content: sizes.append(len(content))))
-    page.goto(served[0])
+    page.goto(served.url)
     page.locator(".edgel-pane", has_text="edge points shown").first.wait_for(timeout=1000 * TIMEOUT)
     wait_for(lambda: count_pixels(page, EdgeKind.BOUNDARY) > 50, "the edges in the picture")
     cloud = 15 * 40_000  # bytes: three coordinates and a color a point
@@ -169,8 +147,8 @@ def test_a_large_cloud_is_drawn_in_part_until_every_point_is_asked_for(browser, 
     from edgel._viewer.server import running
 
     monkeypatch.setattr(source, "FEW", 10_000)
-    with running([str(folder / "tee.ply")]) as (server, _, _):
-        page = open_tab(browser, f"http://127.0.0.1:{server.get_port()}", errors)
+    with running([str(folder / "tee.ply")]) as viewer:
+        page = open_tab(browser, viewer.url, errors)
         drawn = number_in(page.locator(".edgel-status").inner_text(), r"only ([\d,]+) points are drawn")
         assert 5_000 < drawn <= 10_000
         before, edges = picture(page), shown(page)
@@ -182,7 +160,7 @@ def test_a_large_cloud_is_drawn_in_part_until_every_point_is_asked_for(browser, 
 
 
 def test_the_view_fits_the_window_until_it_is_turned(browser, served, errors):
-    page = open_tab(browser, served[0], errors)
+    page = open_tab(browser, served.url, errors)
     where = "() => window.__viserMutable.camera.position.length()"
     near = page.evaluate(where)
     page.set_viewport_size({"width": 700, "height": 600})
@@ -215,7 +193,7 @@ def test_saved_file_is_what_detect_answers(page, tee, tmp_path):
     download.value.save_as(tmp_path / "saved.ply")
     cloud = edgel.read(tee)
     edges = edgel.detect(cloud)
-    expected, saved = edges.take(edges.strength >= 0.5).cloud(cloud), edgel.read(tmp_path / "saved.ply")
+    expected, saved = edges.take(edges.strength >= 0.5).to_cloud(cloud), edgel.read(tmp_path / "saved.ply")
     np.testing.assert_array_equal(saved.xyz, expected.xyz)
     assert set(saved.attributes) == set(expected.attributes)
     for name, values in expected.attributes.items():
@@ -256,7 +234,7 @@ def test_published_method_beside_with_its_images(page, served):
     page.get_by_text("tee.ply: edge map").wait_for()
     page.locator(".edgel-pane", has_text="paper").wait_for()
     wait_for(lambda: count_pixels(page, EdgeKind.IMAGE) > 50, "the edges of the published method")
-    assert served[1].wait_idle(TIMEOUT)
+    assert served.session.wait_idle(TIMEOUT)
     assert count_pixels(page, EdgeKind.BOUNDARY) > 10
     choose(page, "Method", "edgel")
     wait_for(lambda: count_pixels(page, EdgeKind.IMAGE) == 0, "edgel's edges alone")
@@ -297,8 +275,8 @@ def test_python_lines_of_the_page_find_what_it_shows(page, tmp_path, monkeypatch
 
 
 def test_two_tabs_twenty_moves_and_a_tab_closed_meanwhile(page, browser, served, errors):
-    url, session = served
-    other = open_tab(browser, url, errors)
+    session = served.session
+    other = open_tab(browser, served.url, errors)
     for step in range(20):
         type_number(other, "Scale", 1.5 + 0.5 * (step % 10))
     wait_for(lambda: session.settings.scale == 6.0, "the last move")
@@ -318,8 +296,8 @@ def test_pages_from_elsewhere_are_kept_out(served):
     from websockets.sync.client import connect
     from websockets.typing import Origin, Subprotocol
 
-    address = served[0].replace("http", "ws")
+    address = served.url.replace("http", "ws")
     protocol = [Subprotocol(f"viser-v{viser.__version__}")]
     with pytest.raises(InvalidStatus, match="403"):
         connect(address, origin=Origin("http://example.com"), subprotocols=protocol)
-    connect(address, origin=Origin(served[0]), subprotocols=protocol).close()
+    connect(address, origin=Origin(served.url), subprotocols=protocol).close()

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from importlib.metadata import version
 from typing import Annotated
 
 import typer
 
+import edgel
 from edgel._cli import convert, demo, detect, info, normals, render, view
+from edgel._cli.methods import MethodCommand
 from edgel._cli.options import help_text
 
 _HELP = """Find the edges of 3D point clouds, and their normals, without tuning.
@@ -37,7 +38,7 @@ app = typer.Typer(
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"edgel {version('edgel')}")
+        typer.echo(f"edgel {edgel.__version__}")
         raise typer.Exit
 
 
@@ -50,10 +51,10 @@ def main(
     """Find the edges of 3D point clouds."""
 
 
-app.command(help=help_text(detect.HELP), epilog=_EPILOG)(detect.detect)
+app.command(cls=MethodCommand, help=help_text(detect.HELP), epilog=_EPILOG)(detect.detect)
 app.command(help=help_text(view.HELP), epilog=_EPILOG)(view.view)
 app.command(help=help_text(normals.HELP), epilog=_EPILOG)(normals.normals)
 app.command(help=help_text(info.HELP), epilog=_EPILOG)(info.info)
 app.command(help=help_text(convert.HELP), epilog=_EPILOG)(convert.convert)
-app.command(help=help_text(render.HELP), epilog=_EPILOG)(render.render)
+app.command(cls=MethodCommand, help=help_text(render.HELP), epilog=_EPILOG)(render.render)
 app.command(help=help_text(demo.HELP), epilog=_EPILOG)(demo.demo)

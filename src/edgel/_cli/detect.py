@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import inspect
 import math
-import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 import edgel
 from edgel._cli import files, options
-from edgel._cli.errors import ExitCode, Failure, as_option, exit_codes, failing_as
-from edgel._cli.output import count, print_json, print_line, print_table, seconds
+from edgel._cli.errors import ExitCode, Failure, exit_codes, failing_as
+from edgel._cli.methods import check_options, find_edges
+from edgel._cli.output import print_json, print_line, print_table
 from edgel._cli.progress import Watch
-from edgel._detect import PRESETS
-from edgel._range_image.view import METHODS
+from edgel._cli.summary import collect, summary
 from edgel._stages import Stages
-from edgel.edges import EdgeKind, Edges, as_kinds
+from edgel.edges import Edges
 
 HELP = """Find the edge points of a cloud, their kind, and their normals.
 
@@ -37,13 +35,11 @@ Examples:
   edgel detect depth.png --intrinsics camera.json -o edges.ply
   edgel detect scan.ply --kinds crease,boundary --method surface -o edges.ply
   edgel detect scan.ply --scale 4 --min-angle 30 -o large.ply
-  edgel detect scan.ply --preset paper --sigma 2 --report report
+  edgel detect scan.ply --method paper --sigma 2 --report report
   cat scan.ply | edgel detect - -o - > edges.ply
 """
 
 _SUSPICIOUS_SHARE = 0.5  # of edge points; CAD models sampled with known edges have 2 to 13 %
-
-FUNCTIONS = {"default": edgel.detect, "paper": edgel.paper.detect}
 
 
 def detect(
@@ -52,9 +48,8 @@ def detect(
         str | None,
         typer.Option("-o", "--output", metavar="OUT", help="The cloud to write; - writes PLY to stdout."),
     ] = None,
-    preset: options.Preset = options.PRESET,
+    method: options.Method = options.METHOD,
     kinds: options.Kinds = None,
-    method: options.Method = None,
     label_all: Annotated[
         bool, typer.Option("--all", help="Write the whole cloud, labelled; edge_kind is 0 where there is no edge.")
     ] = False,
@@ -76,7 +71,7 @@ def detect(
     scale: Annotated[
         float | None,
         options.option(
-            edgel.detect_at_scale,
+            edgel.detect,
             "scale",
             "Find only what is larger than this many median spacings: on the cloud thinned to one point a voxel.",
         ),
@@ -109,34 +104,33 @@ def detect(
     debug: options.Debug = False,
 ) -> None:
     """Find the edge points of a cloud."""
-    given = {
-        "kinds": kinds,
-        "method": method,
-        "min_strength": min_strength,
-        "num_neighbors": num_neighbors,
-        "viewpoint": viewpoint,
-        "scale": scale,
-        "width": width,
-        "height": height,
-        "kernel_size": kernel_size,
-        "sigma": sigma,
-        "low": low,
-        "high": high,
-        "tolerance": tolerance,
-        "gray_min": gray_min,
-    }
+    given = options.given(
+        kinds=kinds,
+        min_strength=min_strength,
+        num_neighbors=num_neighbors,
+        viewpoint=viewpoint,
+        scale=scale,
+        width=width,
+        height=height,
+        kernel_size=kernel_size,
+        sigma=sigma,
+        low=low,
+        high=high,
+        tolerance=tolerance,
+        gray_min=gray_min,
+    )
     page = None
     with exit_codes(as_json=as_json, debug=debug):
-        given = check_options(preset, {name: value for name, value in given.items() if value is not None})
+        given = check_options(method, given)
         check_outputs(output, report, label_all=label_all, as_json=as_json)
-        if preset == "paper" and min_angle is not None:
-            raise Failure(ExitCode.USAGE, "--min-angle: the paper preset tells no creases apart; leave it out")
+        if method == options.PAPER and min_angle is not None:
+            raise Failure(ExitCode.USAGE, "--min-angle: the published method tells no creases apart; leave it out")
         if crop is not None and not all(low <= high for low, high in zip(crop[:3], crop[3:], strict=True)):
             raise Failure(ExitCode.USAGE, f"--crop: the first corner must be the lower one, got {crop}")
         files.check_input(source, intrinsics)
         with Watch() as watch:
             stages = Stages(watch)
-            cloud, edges = read_and_detect(source, intrinsics, preset, given, stages)
+            cloud, edges = find_edges(source, intrinsics, method, given, stages)
             edges = choose(cloud, edges, min_angle, crop)
             if output is not None:
                 with stages("writing"):
@@ -161,42 +155,6 @@ def detect(
             print_line("nothing was written; add -o edges.ply to write the edge points", style="dim")
 
 
-def check_options(preset: str, given: dict[str, Any]) -> dict[str, Any]:
-    """Return the options given as the preset's function takes them, or raise a `Failure` that names the wrong ones."""
-    if preset not in PRESETS:
-        raise Failure(ExitCode.USAGE, f"--preset: {preset!r} is unknown; choose {' or '.join(PRESETS)}")
-    foreign = [name for name in given if name not in arguments(preset)]
-    if foreign:
-        names = ", ".join(map(as_option, foreign))
-        others = " or ".join(other for other in PRESETS if set(foreign) <= arguments(other))
-        remedy = f"add --preset {others}, or leave it out" if others else "leave it out"
-        raise Failure(ExitCode.USAGE, f"{names}: not an option of the {preset} preset; {remedy}")
-    if given.get("method", METHODS[0]) not in METHODS:
-        raise Failure(ExitCode.USAGE, f"--method: {given['method']!r} is unknown; choose from {', '.join(METHODS)}")
-    if "kinds" in given:
-        with failing_as(ExitCode.USAGE, "", ["kinds"]):
-            given["kinds"] = as_kinds([name for word in given["kinds"].split(",") if (name := word.strip())])
-    return given
-
-
-def arguments(preset: str) -> set[str]:
-    """Return the names of the arguments that a preset has beside the points."""
-    names = {*inspect.signature(edgel.detect_at_scale).parameters, *inspect.signature(FUNCTIONS[preset]).parameters}
-    return names - {"points", "options"}
-
-
-def read_and_detect(
-    source: str, intrinsics: str | None, preset: Any, given: Mapping[str, Any], stages: Stages
-) -> tuple[edgel.Cloud, Edges]:
-    """Read a cloud and find its edges, with the options that `check_options` let through."""
-    with stages("reading"):
-        cloud = files.read_cloud(source, intrinsics)
-    with failing_as(ExitCode.DATA, source, arguments(preset)):
-        edges = edgel.detect_at_scale(cloud, preset=preset, **given, progress=stages.progress)
-    stages.seconds.update(edges.seconds)
-    return cloud, edges
-
-
 def choose(cloud: edgel.Cloud, edges: Edges, min_angle: float | None, crop: Sequence[float] | None) -> Edges:
     """Return the edge points that are sharp enough, the angle in degrees, and inside a box, corner after corner."""
     if min_angle is not None:
@@ -217,87 +175,17 @@ def check_outputs(output: str | None, report: str | None, *, label_all: bool, as
 
 
 def report_on(source: str, output: str | None, cloud: edgel.Cloud, edges: Edges, directory: str) -> Path:
-    """Write the report of one cloud, compared with what the other preset finds in it, and return its page."""
+    """Write the report of one cloud, compared with what the other detector finds in it, and return its page."""
     from edgel._report import Case, write_report  # not at the top: Matplotlib takes time to import
 
     name = "stdin" if source == files.PIPE else Path(source).stem
-    (preset,) = set(PRESETS) - {edges.preset}
+    find_other = edgel.detect if edges.method == options.PAPER else edgel.paper.detect
     try:
-        other = edgel.detect(cloud, preset=preset)
-    except ValueError:  # what one preset can look at is too little for the other: nothing to compare
+        other = find_other(cloud)
+    except ValueError:  # what one detector can look at is too little for the other: nothing to compare
         other = None
     beside = {"the cloud": source, "what was written": output}
     beside = {what: path for what, path in beside.items() if path not in (None, files.PIPE)}
     with failing_as(ExitCode.OUTPUT, directory):
         case = Case(name, cloud, edges, other=other, files=beside)
         return write_report([case], directory, title=f"Edges of {name}")
-
-
-def creases(edges: Edges) -> dict[str, Any]:
-    """Return the median angle of the creases, in degrees (NaN where none is known), and how many bend which way."""
-    convex = edges.convex[(edges.kind & EdgeKind.CREASE) > 0]
-    return {
-        "median_angle_degrees": math.degrees(edges.median_crease_angle),
-        "convex": int((convex > 0).sum()),
-        "concave": int((convex < 0).sum()),
-    }
-
-
-def crease_remark(edges: Edges) -> str:
-    """Say of the creases what is known of both their faces."""
-    known = creases(edges)
-    angle = known["median_angle_degrees"]
-    words = [] if math.isnan(angle) else [f"median angle {angle:.1f} degrees"]
-    return ", ".join(words + [f"{count(known[name])} {name}" for name in ("convex", "concave") if known[name]])
-
-
-def collect(
-    source: str, output: str | None, page: Path | None, edges: Edges, by_stage: dict[str, float]
-) -> dict[str, Any]:
-    """Return what ``--json`` prints."""
-    return {
-        "input": source,
-        "output": output,
-        "report": None if page is None else str(page),
-        "preset": edges.preset,
-        "method": edges.method,
-        "reason": edges.reason,
-        "points": edges.num_points,
-        "not_finite": edges.num_dropped,
-        "edge_points": len(edges),
-        "share": edges.share,
-        "kinds": edges.count_kinds(),
-        "creases": creases(edges),
-        "normals_undefined": edges.num_without_normal,
-        "parameters": edges.parameters,
-        "seconds": by_stage,
-        "peak_memory_bytes": peak_memory(),
-    }
-
-
-def summary(edges: Edges, by_stage: dict[str, float]) -> list[tuple[str, ...]]:
-    """Return the rows of the table."""
-    rows: list[tuple[str, ...]] = [("points", count(edges.num_points))]
-    if edges.num_dropped:
-        rows.append(("not finite", count(edges.num_dropped), "left out"))
-    rows.append(("edge points", count(len(edges)), f"{edges.share:.1%} of the finite points"))
-    for name, number in edges.count_kinds().items():
-        rows.append((f"  {name}", count(number), crease_remark(edges) if name == "crease" else ""))
-    if edges.num_without_normal:
-        rows.append(("normals undefined", count(edges.num_without_normal), "the neighbours span no plane"))
-    rows.append(("method", edges.method, edges.reason))
-    rows.append(("time", seconds(sum(by_stage.values()))))
-    rows += [(f"  {name}", seconds(duration)) for name, duration in by_stage.items()]
-    if (peak := peak_memory()) is not None:
-        rows.append(("memory", f"{peak / 1e6:,.0f} MB", "at most, that of the program itself included"))
-    return rows
-
-
-def peak_memory() -> int | None:
-    """Return the most memory this process has held, in bytes, None where the system does not tell."""
-    try:
-        import resource
-    except ImportError:  # Windows
-        return None
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak if sys.platform == "darwin" else peak * 1024

@@ -14,6 +14,7 @@ from edgel._cli.output import count, length, print_json, print_table, stdout_con
 from edgel._cli.progress import Watch
 from edgel._neighbors.kdtree import bounds, build_index
 from edgel._neighbors.knn import knn
+from edgel._neighbors.queries import at_points, every_point
 from edgel.cloud import Cloud, check_points
 
 HELP = """Say what a file holds: points, extent, spacing, fields, and what may surprise (NaN, duplicates).
@@ -74,8 +75,11 @@ def nearest(xyz: np.ndarray) -> dict[str, Any]:
     if len(xyz) < 2:
         return {"spacing": None, "duplicates": 0, "sampled": None}
     sampled = len(xyz) > _SAMPLE
-    queries = xyz[np.random.default_rng(0).choice(len(xyz), _SAMPLE, replace=False)] if sampled else xyz
     index = build_index(xyz)
+    if sampled:
+        queries = at_points(index, np.random.default_rng(0).choice(len(xyz), _SAMPLE, replace=False))
+    else:
+        queries = every_point(index)
     distances = knn(index, queries, 2).distances[:, 1]
     apart = distances[distances > 0]
     duplicates = round((len(distances) - len(apart)) / len(distances) * len(xyz))

@@ -41,8 +41,7 @@ def normals(
     debug: options.Debug = False,
 ) -> None:
     """Estimate the normal of every point of a cloud."""
-    given = {"num_neighbors": num_neighbors, "viewpoint": viewpoint}
-    given = {name: value for name, value in given.items() if value is not None}
+    given = options.given(num_neighbors=num_neighbors, viewpoint=viewpoint)
     with exit_codes(debug=debug):
         files.check_output(output)
         files.check_input(source, intrinsics)

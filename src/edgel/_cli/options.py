@@ -10,11 +10,11 @@ import typer
 
 import edgel
 from edgel._cli.errors import as_option
-from edgel._detect import PRESETS
-from edgel._range_image.view import METHODS
+from edgel._range_image import METHODS as OWN_METHODS
 from edgel.edges import ASKABLE, EdgeKind, kind_names
 
-PAPER = "The published method (--preset paper)"
+PAPER = "paper"  # the method that is `edgel.paper.detect`
+METHODS = (*OWN_METHODS, PAPER)
 
 Input = Annotated[str, typer.Argument(metavar="IN", help="The cloud to read; - reads PLY from stdin.")]
 Intrinsics = Annotated[
@@ -84,11 +84,20 @@ def help_text(text: str) -> str:
 
 def paper_option(name: str, text: str) -> Any:
     """Make an option of the published method."""
-    return option(edgel.paper.detect, name, text, panel=PAPER)
+    return option(edgel.paper.detect, name, text, panel=f"The published method (--method {PAPER})")
 
 
-Preset = Annotated[str, typer.Option(metavar="|".join(PRESETS), help="The method: edgel's own, or the published one.")]
-PRESET = default_of(edgel.detect, "preset")
+def given(**options: Any) -> dict[str, Any]:
+    """Return the options that are not None; the others are left to the function.
+
+    Examples
+    --------
+    >>> given(sigma=2.0, low=None)
+    {'sigma': 2.0}
+    """
+    return {name: value for name, value in options.items() if value is not None}
+
+
 Kinds = Annotated[
     str | None,
     option(
@@ -98,13 +107,15 @@ Kinds = Annotated[
         metavar="NAMES",
     ),
 ]
+METHOD = default_of(edgel.detect, "method")
 Method = Annotated[
-    str | None,
+    str,
     option(
         edgel.detect,
         "method",
         f"How to look at the cloud: {', '.join(METHODS[:-1])} or {METHODS[-1]}. Surface takes any cloud, from any "
-        "side; organized goes along its rows and columns; the last three look at a projection; auto chooses.",
+        "side; organized goes along its rows and columns; orthographic, pinhole and spherical look at a projection; "
+        "auto chooses among these. Paper is the published method, which looks along Z.",
         metavar="NAME",
     ),
 ]

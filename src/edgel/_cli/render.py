@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import typer
 
 from edgel._cli import files, options
-from edgel._cli.detect import arguments, check_options, read_and_detect
 from edgel._cli.errors import ExitCode, Failure, exit_codes, failing_as
+from edgel._cli.methods import arguments, check_options, find_edges
 from edgel._cli.output import count, print_line, print_table, seconds
 from edgel._cli.progress import Watch
 from edgel._stages import Stages
@@ -29,16 +29,15 @@ Examples:
   edgel render scan.ply -o picture.png
   edgel render scan.laz -o picture.png --direction top --color-by rgb --kinds crease
   edgel render depth.png --intrinsics camera.json -o picture.png --background dark --edge-color strength
-  edgel render scan.ply -o picture.png --preset paper --direction 1,0,-0.5 --size 1920x1080
+  edgel render scan.ply -o picture.png --method paper --direction 1,0,-0.5 --size 1920x1080
 """
 
 
 def render(
     source: options.Input,
     output: Annotated[str, typer.Option("-o", "--output", metavar="PNG", help="The picture to write.")],
-    preset: options.Preset = options.PRESET,
+    method: options.Method = options.METHOD,
     kinds: options.Kinds = None,
-    method: options.Method = None,
     min_strength: Annotated[
         float | None, typer.Option(metavar="SHARE", help="Leave out edge points weaker than this, 0 to 1.")
     ] = None,
@@ -67,21 +66,20 @@ def render(
     debug: options.Debug = False,
 ) -> None:
     """Draw a cloud and its edges."""
-    given = {"kinds": kinds, "method": method, "viewpoint": viewpoint}
     with exit_codes(debug=debug):
-        given = check_options(preset, {name: value for name, value in given.items() if value is not None})
+        given = check_options(method, options.given(kinds=kinds, viewpoint=viewpoint))
         look: dict[str, Any] = {"direction": _direction(direction), "size": _size(size)}
         look |= {"color_by": color_by, "edge_color": edge_color, "background": background}
         if min_strength is not None and not 0 <= min_strength <= 1:
             raise Failure(ExitCode.USAGE, f"--min-strength: expected 0 to 1, got {min_strength:g}")
-        if min_strength is not None and "min_strength" in arguments(preset):
+        if min_strength is not None and "min_strength" in arguments(method):
             given["min_strength"] = min_strength
         files.check_extension(output, [".png"])
         files.check_folder(output, Path(output).parent)
         files.check_input(source, intrinsics)
         with Watch() as watch:
             stages = Stages(watch)
-            cloud, edges = read_and_detect(source, intrinsics, preset, given, stages)
+            cloud, edges = find_edges(source, intrinsics, method, given, stages)
             if min_strength is not None:  # the published method does not leave any out itself
                 edges = edges.take(edges.strength >= min_strength)
             with stages("drawing"), failing_as(ExitCode.DATA, source, look):

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel._color.chains import hysteresis, thin
+from edgel._color.chains import hysteresis, non_maximum_suppression
 from edgel._color.channels import color_channels
 from edgel._color.gradient import color_gradient, smooth_colors
 from edgel._color.step import color_step
-from edgel._neighbors.candidates import at_places, every_place
 from edgel._neighbors.kdtree import NeighborIndex
 from edgel._neighbors.knn import visit_neighbors
+from edgel._neighbors.queries import at_places, every_place
 
 __all__ = ["ColorEdges", "color_channels", "color_edges"]
 
@@ -120,7 +120,7 @@ def color_edges(
         return found
     places, steps = places[weak], steps[weak]
     rows = index.order[places]
-    ridge = thin(xyz[rows], gradients[places, 1:], steps[:, 2], steps[:, 3])
+    ridge = non_maximum_suppression(xyz[rows], gradients[places, 1:], steps[:, 2], steps[:, 3])
     rows, steps = rows[ridge], steps[ridge]
     kept = hysteresis(xyz[rows], steps[:, 2], (steps[:, 0] >= high) & (steps[:, 1] >= _STRONG))
     found.strength[rows[kept]] = np.minimum(steps[kept, 0], 1.0)

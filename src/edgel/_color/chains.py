@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from edgel._kernels.parallel import kernel
-from edgel._neighbors.candidates import every_point
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import visit_neighbors
+from edgel._neighbors.queries import every_point
 
 _NEAREST = 13  # edge points that are looked at, the point itself among them
 _REACH = 2.1  # how far apart two linked points are at most, in spacings: a chain may miss one
@@ -17,7 +17,9 @@ _LEVEL = 0.25  # unless they lie level, one behind the other along the edge
 _TIE = 1e-6  # in spacings: of two points equally far from the edge rounding must not choose
 
 
-def thin(xyz: np.ndarray, across: np.ndarray, spacing: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+def non_maximum_suppression(
+    xyz: np.ndarray, across: np.ndarray, spacing: np.ndarray, offsets: np.ndarray
+) -> np.ndarray:
     """Choose points along edges so that no two lie abreast: those nearest to the edge first.
 
     Parameters

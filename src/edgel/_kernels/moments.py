@@ -43,7 +43,7 @@ def add_moments(vectors, start, stop, sums):
 
 @kernel
 def move_moments(sums, x, y, z, out):
-    """Add moments (10,) about a point's own centroid, which lies at x, y, z, to moments `out` (10,) about the origin."""
+    """Add moments (10,) about their own centroid, which lies at x, y, z, to moments `out` (10,) about the origin."""
     n = sums[0]
     out[0] += n
     out[1] += n * x
@@ -59,7 +59,7 @@ def move_moments(sums, x, y, z, out):
 
 @kernel
 def plane_of_moments(sums, plane):
-    """Fit a plane to points of moments `sums` (10,): normal and centroid into `plane` (6,); returns the squares left."""
+    """Fit a plane to points of moments `sums` (10,): normal, centroid into `plane` (6,); returns the squares left."""
     n, sx, sy, sz = sums[0], sums[1], sums[2], sums[3]
     cx, cy, cz = sx / n, sy / n, sz / n
     smallest, _, nx, ny, nz = smallest_eigenpair(

@@ -6,7 +6,6 @@ them select_blocks those near themselves.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -14,95 +13,12 @@ import numpy as np
 from edgel._kernels.parallel import kernel, part
 from edgel._kernels.rows import aligned
 from edgel._kernels.simd import LANES, bits, larger, load, spread
-from edgel._neighbors.kdtree import NeighborIndex, build_index, node_start
+from edgel._neighbors.kdtree import node_start
 
 CHUNK = 128  # queries that look at the tree together
 SLACK = 1.25  # squared reach over what the queries before needed
 _NEAR = 2048  # most blocks near a chunk; queries that lie wider apart look at the tree by themselves
 _FEW = 192  # most blocks near eight queries; such as lie wider apart are searched alone
-
-
-class TreeArrays(NamedTuple):
-    """The arrays of a `NeighborIndex`, as kernels take them: the coordinates of each axis by themselves."""
-
-    x: np.ndarray
-    y: np.ndarray
-    z: np.ndarray
-    order: np.ndarray
-    boxes: np.ndarray
-    blocks: np.ndarray
-
-
-class QueryArrays(NamedTuple):
-    """The arrays of `Queries`, as kernels take them."""
-
-    x: np.ndarray
-    y: np.ndarray
-    z: np.ndarray
-    targets: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class Queries:
-    """Where neighbours are asked for, in an order in which consecutive ones lie together.
-
-    Attributes
-    ----------
-    xyz : (3, M) float64
-        Coordinates, one axis a row.
-    targets : (M,) int64
-        Where the results of each query go: a permutation.
-    """
-
-    xyz: np.ndarray
-    targets: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.targets)
-
-    @property
-    def arrays(self) -> QueryArrays:
-        """The arrays that kernels take."""
-        x, y, z = self.xyz
-        return QueryArrays(x, y, z, self.targets)
-
-
-def tree_of(index: NeighborIndex) -> TreeArrays:
-    """Return the arrays of an index."""
-    x, y, z = index.xyz
-    return TreeArrays(x, y, z, index.order, index.boxes, index.blocks)
-
-
-def every_point(index: NeighborIndex) -> Queries:
-    """Ask at every point of an index; the results are in the order of the points."""
-    return Queries(index.xyz, index.order)
-
-
-def every_place(index: NeighborIndex) -> Queries:
-    """Ask at every point of an index; the results are in the order of the places."""
-    return Queries(index.xyz, np.arange(len(index)))
-
-
-def at_places(index: NeighborIndex, places: np.ndarray, targets: np.ndarray | None = None) -> Queries:
-    """Ask at some places (M,) of an index, ascending, which lie in its order already; no tree of their own is needed.
-
-    The results are in the order of the places, unless `targets` (M,) says where each goes.
-    """
-    return Queries(index.xyz.take(places, axis=1), np.arange(len(places)) if targets is None else targets)
-
-
-def at_points(index: NeighborIndex, points: np.ndarray) -> Queries:
-    """Ask at some points (M,) of an index, each once; the results are in their order."""
-    number = np.full(len(index), -1)
-    number[points] = np.arange(len(points))
-    targets = number[index.order]
-    places = np.flatnonzero(targets >= 0)
-    return at_places(index, places, targets[places])
-
-
-def anywhere(xyz: np.ndarray) -> Queries:
-    """Ask at any positions (M, 3), which are sorted by a tree of their own; the results are in the order given."""
-    return every_point(build_index(xyz))
 
 
 class Scratch(NamedTuple):

@@ -15,8 +15,9 @@ import numpy as np
 from edgel._kernels.parallel import kernel, part, run_slices
 from edgel._kernels.rows import aligned
 from edgel._kernels.simd import LANES, as_floats, bits, counted, counts_of, load, store
-from edgel._neighbors.candidates import CHUNK, Queries, anywhere, gather_blocks, larger_scratch, make_scratch, tree_of
+from edgel._neighbors.candidates import CHUNK, gather_blocks, larger_scratch, make_scratch
 from edgel._neighbors.kdtree import NeighborIndex
+from edgel._neighbors.queries import Queries, anywhere, tree_of
 from edgel._neighbors.search import first_of, nearest_of_eight
 
 _SLICE = 1024  # queries whose neighbours exist at a time, for each thread
@@ -73,8 +74,8 @@ def visit_neighbors(
     Parameters
     ----------
     visit : kernel
-        Takes ``(first, places, squared, queries.xyz, queries.targets, index.xyz, *arguments)``: the queries from `first`
-        on, the (n, k) places of their neighbours, nearest first, and the squared distances to them.
+        Takes ``(first, places, squared, queries.xyz, queries.targets, index.xyz, *arguments)``: the queries from
+        `first` on, the (n, k) places of their neighbours, nearest first, and the squared distances to them.
     queries : Queries
     index : NeighborIndex
     num_neighbors : int

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from edgel._kernels.parallel import run_slices
-from edgel._neighbors.candidates import Queries, anywhere, every_point, tree_of
 from edgel._neighbors.kdtree import NeighborIndex, build_index
 from edgel._neighbors.plane_fits import fit_slice
+from edgel._neighbors.queries import Queries, anywhere, every_point, tree_of
 from edgel.cloud import as_cloud, as_vector, check_points, check_rows
 
 _SLICE = 8192  # queries: the first chunk of a slice has none before it to guess its reach from

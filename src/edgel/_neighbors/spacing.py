@@ -13,9 +13,9 @@ import numpy as np
 
 from edgel._kernels.grid import cell_of
 from edgel._kernels.parallel import kernel, run_slices
-from edgel._neighbors.candidates import at_places
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import knn
+from edgel._neighbors.queries import at_places
 from edgel.cloud import check_points
 
 _SAMPLE = 20_000  # points whose nearest neighbours are looked for

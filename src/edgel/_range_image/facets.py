@@ -40,10 +40,10 @@ def noise_level(image: RangeImage) -> np.ndarray:
     return level.repeat(_TILE, axis=1)[:, : image.shape[1]]
 
 
-def without_lonely(depth: np.ndarray, spacing: np.ndarray, noise: np.ndarray) -> np.ndarray:
+def without_isolated(depth: np.ndarray, spacing: np.ndarray, noise: np.ndarray) -> np.ndarray:
     """Drop pixels that fewer than 4 of their 24 neighbours hold: points floating alone."""
     kept = np.full(depth.shape, np.nan)
-    run_slices(_held, len(depth), depth, _CLOSE * (spacing + noise), kept, size=32)
+    run_slices(_without_isolated, len(depth), depth, _CLOSE * (spacing + noise), kept, size=32)
     return kept
 
 
@@ -107,7 +107,7 @@ def _tile_levels(start, stop, depth, perspective, level):
 
 
 @kernel
-def _held(start, stop, depth, close, kept):
+def _without_isolated(start, stop, depth, close, kept):
     height, width = depth.shape
     steps = np.empty((2, 20))
     for row in range(start, stop):

@@ -9,7 +9,7 @@ import numpy as np
 
 from edgel._kernels.hysteresis import levels
 from edgel._kernels.parallel import kernel, run_slices
-from edgel._range_image.facets import local_planes, noise_level, without_lonely
+from edgel._range_image.facets import local_planes, noise_level, without_isolated
 from edgel._range_image.range_image import RangeImage
 from edgel.edges import EdgeKind
 
@@ -82,7 +82,7 @@ def _steps_and_rims(image: RangeImage, xyz: np.ndarray) -> tuple[np.ndarray, np.
     spacing = image.spacing
     least = np.maximum(STEP * spacing, rounding)
     noise = np.fmax(noise_level(image), FINEST * spacing)
-    depth = without_lonely(image.depth, spacing, noise)
+    depth = without_isolated(image.depth, spacing, noise)
     rim = beside_void(image.depth) & ~np.isnan(depth)
     # Noise is averaged over as few pixels as it allows: edges are seldom straight for long.
     known = ~np.isnan(spacing)

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from edgel._kernels.parallel import kernel
-from edgel._neighbors.candidates import at_places
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import knn
+from edgel._neighbors.queries import at_places
 from edgel._neighbors.spacing import covered_area
 
 FRAME = 4  # empty pixels around a projection, so that the cloud's rim lies beside a void

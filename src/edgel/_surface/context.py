@@ -47,7 +47,7 @@ _SAME_LINE = 0.35  # spacings between lines that two points beside each other pu
 
 
 @kernel
-def gather_context(first, places, squared, queries, targets, xyz, chances, slot, lines, feet, features):
+def gather_context(first, places, squared, queries, targets, xyz, probabilities, slot, lines, feet, features):
     """Describe the probabilities of each of two kinds of edge around some points.
 
     Parameters: the probability of either kind at every place, (2, N) float32; which row of `lines` and `feet` (M, 3),
@@ -64,30 +64,38 @@ def gather_context(first, places, squared, queries, targets, xyz, chances, slot,
         away /= spacing
         for kind in range(2):
             _describe(
-                places[q], away, spacing, chances[kind], chances[1 - kind], slot, lines, feet, features[kind, row]
+                places[q],
+                away,
+                spacing,
+                probabilities[kind],
+                probabilities[1 - kind],
+                slot,
+                lines,
+                feet,
+                features[kind, row],
             )
 
 
 @kernel
-def _describe(places, away, spacing, chance, other, slot, lines, feet, out):
+def _describe(places, away, spacing, probability, other, slot, lines, feet, out):
     """Describe the probabilities of one kind of edge around a point."""
     out[:] = 0.0
-    own, s = chance[places[0]], slot[places[0]]
-    tx, ty, tz, line_like = _main_direction(places, away, chance)
+    own, s = probability[places[0]], slot[places[0]]
+    tx, ty, tz, line_like = _main_direction(places, away, probability)
     agree = abs(lines[s, 0] * tx + lines[s, 1] * ty + lines[s, 2] * tz) if s >= 0 else 0.0
     out[OWN], out[ALIGNMENT], out[AGREEMENT] = own, line_like, agree
-    _sums(places, chance, other, out)
-    _along_and_across(places, away, chance, tx, ty, tz, own, out)
+    _sums(places, probability, other, out)
+    _along_and_across(places, away, probability, tx, ty, tz, own, out)
     if s >= 0:
-        _along_and_across_line(places, away, chance, slot, lines, feet, s, spacing, out)
+        _along_and_across_line(places, away, probability, slot, lines, feet, s, spacing, out)
 
 
 @kernel
-def _main_direction(places, away, chance):
+def _main_direction(places, away, probability):
     """Direction along which the probabilities lie, and how far they lie on a line, 0 to 1."""
     xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(1, len(places)):
-        w = chance[places[i]]
+        w = probability[places[i]]
         x, y, z = away[0, i], away[1, i], away[2, i]
         xx, xy, xz, yy, yz, zz = (
             xx + w * x * x,
@@ -106,12 +114,12 @@ def _main_direction(places, away, chance):
 
 
 @kernel
-def _sums(places, chance, other, out):
-    """Write the three largest probabilities of the 8 nearest, means over 8, 16 and all, and the other kind's largest."""
+def _sums(places, probability, other, out):
+    """Write the largest three of the 8 nearest, means over 8, 16 and all, and the largest of the other kind."""
     a, b, c, total, others = 0.0, 0.0, 0.0, 0.0, 0.0
     k = len(places)
     for i in range(1, k):
-        p = chance[places[i]]
+        p = probability[places[i]]
         total += p
         if i <= 8:
             if p > a:
@@ -130,8 +138,8 @@ def _sums(places, chance, other, out):
 
 
 @kernel
-def _along_and_across(places, away, chance, tx, ty, tz, own, out):
-    """Write the largest probabilities before and behind the point, and beside it, by the direction in which they lie."""
+def _along_and_across(places, away, probability, tx, ty, tz, own, out):
+    """Write the largest before and behind the point, and beside it, by the direction in which probabilities lie."""
     ahead, behind, beside = 0.0, 0.0, 0.0
     for i in range(1, len(places)):
         x, y, z = away[0, i], away[1, i], away[2, i]
@@ -139,7 +147,7 @@ def _along_and_across(places, away, chance, tx, ty, tz, own, out):
         if far > _FAR or far == 0.0:
             continue
         cosine = (x * tx + y * ty + z * tz) / far
-        p = chance[places[i]]
+        p = probability[places[i]]
         if cosine > _AHEAD:
             ahead = max(ahead, p)
         elif cosine < -_AHEAD:
@@ -150,7 +158,7 @@ def _along_and_across(places, away, chance, tx, ty, tz, own, out):
 
 
 @kernel
-def _along_and_across_line(places, away, chance, slot, lines, feet, s, spacing, out):
+def _along_and_across_line(places, away, probability, slot, lines, feet, s, spacing, out):
     """The same by the point's own line, and what those beside it that see the same line make of it."""
     tx, ty, tz = lines[s, 0], lines[s, 1], lines[s, 2]
     fx, fy, fz = feet[s, 0] / spacing, feet[s, 1] / spacing, feet[s, 2] / spacing
@@ -163,7 +171,7 @@ def _along_and_across_line(places, away, chance, slot, lines, feet, s, spacing, 
         if far > _FAR or far == 0.0 or j < 0:
             continue
         cosine = (x * tx + y * ty + z * tz) / far
-        p = chance[places[i]] * abs(tx * lines[j, 0] + ty * lines[j, 1] + tz * lines[j, 2])
+        p = probability[places[i]] * abs(tx * lines[j, 0] + ty * lines[j, 1] + tz * lines[j, 2])
         if cosine > _AHEAD:
             ahead = max(ahead, p)
         elif cosine < -_AHEAD:

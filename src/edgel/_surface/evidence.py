@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel._neighbors.candidates import at_places
 from edgel._neighbors.kdtree import NeighborIndex
 from edgel._neighbors.knn import visit_neighbors
+from edgel._neighbors.queries import at_places
 from edgel._surface import context, gather, hinge, minimal_planes, sectors, two_planes
 from edgel._surface.features import NUM_EVIDENCE, POINT
 from edgel._surface.plane_scales import SCALES
@@ -67,7 +67,7 @@ def gather_evidence(index: NeighborIndex, screening: Screening, places: np.ndarr
             index,
             min(FITS[-1][0], len(index)),
             screening.normals,
-            screening.statistics.values,
+            screening.statistics,
             np.array(SCALES),
             np.array(FITS),
             np.array(minimal_planes.FITS),

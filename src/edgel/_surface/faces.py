@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from edgel._surface import hinge
+from edgel._surface.classify import Classification
 from edgel._surface.evidence import MIN_TURN, Evidence
 
 
@@ -35,27 +36,47 @@ class Faces:
     angle: np.ndarray
     convex: np.ndarray
 
-    def spread(self, rows: np.ndarray, own: np.ndarray, xyz: np.ndarray, normals: np.ndarray) -> Faces:
-        """Put the faces found at the points `own` (M,) among the edge points `rows` (E,), both ascending.
 
-        Where none are known, the position is the point (E, 3) itself and the first normal that of its one plane (E, 3).
-        """
-        known = np.isin(own, rows) & (self.convex != 0)
-        at = np.searchsorted(rows, own[known])
-        whole = Faces(
-            position=xyz.copy(),
-            direction=np.full((len(rows), 3), np.nan),
-            normals=np.stack([normals, np.full_like(normals, np.nan)], axis=1),
-            angle=np.full(len(rows), np.nan),
-            convex=np.zeros(len(rows), np.int8),
-        )
-        for name in self.__dataclass_fields__:
-            getattr(whole, name)[at] = getattr(self, name)[known]
-        return whole
+def localize(
+    creases: Classification, edge: np.ndarray, xyz: np.ndarray, normals: np.ndarray, viewpoint: np.ndarray | None
+) -> Faces:
+    """Say where exactly the edge runs at each edge point, and how the surface lies on either side.
+
+    Parameters
+    ----------
+    creases : Classification
+        Of those edge points that lie on a crease.
+    edge : (E,) int64
+        The edge points, ascending.
+    xyz : (N, 3) float64
+        All points.
+    normals : (E, 3) float64
+        Of one plane fitted at each edge point: the first normal where no crease is known.
+    viewpoint : (3,) float64 or None
+        Normals are turned towards it, or upwards (+Z) without one.
+
+    Returns
+    -------
+    Faces
+        One row an edge point; where no crease is known the position is the point itself.
+    """
+    found = crease_faces(creases.evidence, xyz[creases.points], viewpoint)
+    known = found.convex != 0
+    at = np.searchsorted(edge, creases.points[known])
+    faces = Faces(
+        position=xyz[edge],
+        direction=np.full((len(edge), 3), np.nan),
+        normals=np.stack([normals, np.full_like(normals, np.nan)], axis=1),
+        angle=np.full(len(edge), np.nan),
+        convex=np.zeros(len(edge), np.int8),
+    )
+    for name in Faces.__dataclass_fields__:
+        getattr(faces, name)[at] = getattr(found, name)[known]
+    return faces
 
 
-def localize(evidence: Evidence, xyz: np.ndarray, viewpoint: np.ndarray | None) -> Faces:
-    """Say where exactly the edge runs, and how the surface lies on either side of it, at each point (M, 3) by the fit that places it best (`Evidence.fit`).
+def crease_faces(evidence: Evidence, xyz: np.ndarray, viewpoint: np.ndarray | None) -> Faces:
+    """Describe the crease at each point (M, 3) by the fit that places it best (`Evidence.fit`).
 
     Normals are turned towards the viewpoint, or upwards (+Z) without one.
     """

@@ -58,7 +58,7 @@ def refine(vectors, count, whole, start, scratch, hinge, best):
     """Part the neighbours by the plane `start` (4 rows), fit, part again; `best` (1 row) takes the squares left.
 
     They are infinite where a side is too small, as it is beyond an infinite level. `whole` (10 rows) are the moments of
-    all; `hinge` (24 rows) is described at `edgel._surface.two_planes.fit_two_planes`, and stays what it was where there is
+    all; `hinge` (24 rows), described at `edgel._surface.two_planes.fit_two_planes`, stays what it was where there is
     none. `scratch` is (5, 10 rows).
     """
     one, other, a, b, line = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]

@@ -1,7 +1,7 @@
 """Leaves of the k-d tree: the first screening, by handfuls of neighbouring points.
 
-Where a leaf and those around it lie on one smooth surface, no point of it needs neighbours of its own. There are a dozen
-times fewer leaves than points, so screening them costs next to nothing and spares most of a large cloud the rest.
+Where a leaf and those around it lie on one smooth surface, no point of it needs neighbours of its own. Leaves are a
+dozen times fewer than points, so screening them costs next to nothing and spares most of a large cloud the rest.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ import numpy as np
 
 from edgel._kernels.moments import add_moments, move_moments, plane_of_moments
 from edgel._kernels.parallel import kernel, run_slices
-from edgel._neighbors.candidates import every_point
 from edgel._neighbors.kdtree import NeighborIndex, build_index, node_start
 from edgel._neighbors.knn import visit_neighbors
+from edgel._neighbors.queries import every_point
 
 PLANAR = 0.01  # surface variation whose planarity is 1 / e
 GROUPS = (1, 4, 8, 12)  # leaves of each group that a plane is fitted to: the leaf and those nearest to it

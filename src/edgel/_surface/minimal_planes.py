@@ -62,9 +62,9 @@ def planes_through(vectors, count, spacing, inlier, cos_min, planes, off, score,
     """Describe the two best planes through a point that differ by the least angle or more.
 
     Takes the neighbours (3, k) relative to the point, nearest first, of which `count` vote; its spacing; how far from a
-    plane its inliers lie at most, in spacings; the cosine of the least angle; what `span_planes` found; `score`, a scratch
-    buffer (PLANES,) float32. Writes `FEATURES` to `features`. The balance tells bends from faces: a smooth bend has
-    inliers of its tangent plane on both sides of the line, a face only on its own.
+    plane its inliers lie at most, in spacings; the cosine of the least angle; what `span_planes` found; `score`, a
+    scratch buffer (PLANES,) float32. Writes `FEATURES` to `features`. The balance tells bends from faces: a smooth bend
+    has inliers of its tangent plane on both sides of the line, a face only on its own.
     """
     features[:] = 0.0
     count = min(count, vectors.shape[1])

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel._neighbors.candidates import at_places
 from edgel._neighbors.kdtree import NeighborIndex, leaf_starts
 from edgel._neighbors.knn import visit_neighbors
+from edgel._neighbors.queries import at_places
 from edgel._surface import gather
 from edgel._surface.forest import Forest, evaluate, load_forests
 from edgel._surface.leaves import describe_leaves
 from edgel._surface.plane_scales import SCALES
-from edgel._surface.statistics import CloudStatistics
 
 LEAF = 0.05  # least probability of an edge in a leaf, or in one around it, for screening its points
 POINT = 0.04  # least probability of an edge at a point, by the cheap evidence, for gathering the costly one
@@ -31,12 +30,13 @@ class Screening:
         of the leaf.
     probability : (N,) float32
         Of an edge, by the cheap evidence.
-    statistics : CloudStatistics
+    statistics : (8,) float32
+        Of the cloud: see `edgel._surface.statistics`.
     """
 
     normals: np.ndarray
     probability: np.ndarray
-    statistics: CloudStatistics
+    statistics: np.ndarray
 
     @property
     def candidates(self) -> np.ndarray:
@@ -44,21 +44,21 @@ class Screening:
         return np.flatnonzero(self.probability > POINT)
 
     def normals_of_points(self, index: NeighborIndex) -> np.ndarray:
-        """Return the normals of the middle scale in the order of the points, (N, 3) float64; NaN where there is none."""
+        """Return the normals of the middle scale by point, (N, 3) float64; NaN where there is none."""
         normals = np.empty((len(index), 3))
         middle = self.normals[:, 1]
         normals[index.order] = np.where(middle[:, 3:] > 0, middle[:, :3], np.nan)
         return normals
 
 
-def screen(index: NeighborIndex, statistics: CloudStatistics, forests: Mapping[str, Forest] | None = None) -> Screening:
+def screen(index: NeighborIndex, statistics: np.ndarray, forests: Mapping[str, Forest] | None = None) -> Screening:
     """Gather the cheap evidence of every point that the leaves of the index do not rule out.
 
     Takes the forests "leaf" and "screen", by default those of the package.
     """
     trees = load_forests() if forests is None else forests
     leaves = describe_leaves(index)
-    of_cloud = np.broadcast_to(statistics.values, (len(leaves.features), len(statistics.values)))
+    of_cloud = np.broadcast_to(statistics, (len(leaves.features), len(statistics)))
     likely = evaluate(trees["leaf"], np.concatenate([leaves.features, of_cloud], axis=1)) >= LEAF
     # Leaves around a likely one are kept too: how the tree cuts the cloud, which turns with it, must not matter.
     size = np.diff(leaf_starts(index))
@@ -68,6 +68,6 @@ def screen(index: NeighborIndex, statistics: CloudStatistics, forests: Mapping[s
     places = np.flatnonzero(kept)
     if len(places):
         k = min(SCALES[-1], len(index))
-        arguments = (np.array(SCALES), statistics.values, trees["screen"].in_step, normals, probability)
+        arguments = (np.array(SCALES), statistics, trees["screen"].in_step, normals, probability)
         visit_neighbors(gather.screen, at_places(index, places, places), index, k, *arguments)
     return Screening(normals, probability, statistics)

@@ -27,7 +27,7 @@ def sector_gaps(vectors, squared, normals, counts, angles, first, last, features
     """Write the widest empty sector of the tangent plane and the second widest, for each number of neighbours.
 
     Takes the neighbours (3, k) relative to the point, nearest first. The tangent plane of the smallest number is that
-    of the middle scale (S, 4), of the others that of the largest. `angles` (k,), `first` and `last` (BINS,) are scratch.
+    of the middle scale (S, 4), of the others that of the largest. `angles` (k,), `first`, `last` (BINS,) are scratch.
     """
     for s in range(len(counts)):
         normal = normals[min(s + 1, len(normals) - 1)]

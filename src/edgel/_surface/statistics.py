@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from edgel._neighbors.candidates import at_places
 from edgel._neighbors.kdtree import NeighborIndex
 from edgel._neighbors.knn import visit_neighbors
+from edgel._neighbors.queries import at_places
 from edgel._surface import plane_scales
 from edgel._surface.plane_scales import OF_SCALE, ROUNDNESS, SCALES, VARIATION, describe
 
@@ -28,25 +26,22 @@ _LARGEST = len(OF_SCALE) * (len(SCALES) - 1)  # first column of the largest scal
 _NEAREST = len(OF_SCALE) * len(SCALES)
 
 
-@dataclass(frozen=True, eq=False)
-class CloudStatistics:
-    """What holds for a cloud as a whole.
+def cloud_statistics(index: NeighborIndex) -> np.ndarray:
+    """Take quantiles of the cheap evidence over evenly sampled points of a cloud.
 
-    Attributes
-    ----------
-    values : (8,) float32
+    Returns
+    -------
+    (8,) float32
         `FEATURES`.
-    has_surface : bool
-        Whether any neighbourhood spans a plane.
+
+    Raises
+    ------
+    ValueError
+        If no neighbourhood spans a plane.
     """
-
-    values: np.ndarray
-    has_surface: bool
-
-
-def cloud_statistics(index: NeighborIndex) -> CloudStatistics:
-    """Take quantiles of the cheap evidence over evenly sampled points of a cloud."""
     features = describe_places(index, index.evenly_sampled(_SAMPLE))
+    if not (features[:, _LARGEST + ROUNDNESS] > _SPANS).any():
+        raise ValueError("points: all lie on one line or spot, so there is no surface whose edges could be found")
     bent, noise, nearest, roundness = (features[:, i] for i in (_LARGEST + VARIATION, VARIATION, _NEAREST, ROUNDNESS))
     quantiles = [
         np.quantile(bent, [0.1, 0.5, 0.9]),
@@ -54,12 +49,11 @@ def cloud_statistics(index: NeighborIndex) -> CloudStatistics:
         np.quantile(nearest, [0.1, 0.5]),
         np.quantile(roundness, [0.5]),
     ]
-    has_surface = bool((features[:, _LARGEST + ROUNDNESS] > _SPANS).any())
-    return CloudStatistics(np.concatenate(quantiles).astype(np.float32), has_surface)
+    return np.concatenate(quantiles).astype(np.float32)
 
 
 def describe_places(index: NeighborIndex, places: np.ndarray) -> np.ndarray:
-    """Return the cheap evidence (M, `plane_scales.NUM_FEATURES`) float32 at some places (M,), ascending, of an index."""
+    """Return the cheap evidence (M, `plane_scales.NUM_FEATURES`) float32 at some places (M,)."""
     features = np.zeros((len(places), plane_scales.NUM_FEATURES), np.float32)
     k = min(SCALES[-1], len(index))
     visit_neighbors(describe, at_places(index, places), index, k, np.array(SCALES), features)

@@ -10,9 +10,10 @@ import viser
 from edgel._labels import LIKELY
 from edgel._neighbors.thinning import thin
 from edgel._viewer.colors import cloud_colors, edge_colors
-from edgel._viewer.layout import FIELD_OF_VIEW, Layout, Place, lay_out
+from edgel._viewer.layout import FIELD_OF_VIEW, Layout, Placement, lay_out
 from edgel._viewer.pick import Picked
-from edgel._viewer.session import LEAST_STRENGTH, Pane
+from edgel._viewer.runs import LEAST_STRENGTH
+from edgel._viewer.session import Pane
 from edgel._viewer.settings import Settings
 from edgel._viewer.source import Drawn
 from edgel.edges import Edges
@@ -58,11 +59,11 @@ class Canvas:
         assert self.layout is not None
         shown = []
         with self._server.atomic():
-            for number, (pane, place) in enumerate(zip(panes, self.layout.places, strict=True)):
-                self._draw_cloud(number, pane, place, settings)
-                shown.append(self._draw_edges(number, pane, place, settings))
+            for number, (pane, placement) in enumerate(zip(panes, self.layout.placements, strict=True)):
+                self._draw_cloud(number, pane, placement, settings)
+                shown.append(self._draw_edges(number, pane, placement, settings))
                 if len(panes) > 1:
-                    self._label(f"/label{number}", pane.name, place)
+                    self._label(f"/label{number}", pane.name, placement)
         self.shown = shown
 
     def look(self, client: viser.ClientHandle | None = None) -> None:
@@ -102,38 +103,38 @@ class Canvas:
         """Size of the edge points of a pane, in scene units."""
         return 2 * float(self._nodes[f"/edges{pane}"].point_size)
 
-    def _draw_cloud(self, number: int, pane: Pane, place: Place, settings: Settings) -> None:
+    def _draw_cloud(self, number: int, pane: Pane, placement: Placement, settings: Settings) -> None:
         source, name = pane.source, f"/cloud{number}"
         drawn = source.drawn(settings)
         key = (drawn, settings.coloring, settings.size, source.normals is not None)
         if self._drawn.get(name) == key:  # nearly always, and comparing millions of points would take its time
             return
         self._drawn[name] = key
-        points = place.to_scene(pane.cloud.xyz[source.shown[drawn.at]])
-        colors = cloud_colors(source, drawn.at, settings.coloring, place.rotation)
-        self._points(name, points, colors, settings.size * _point_size(drawn, place))
+        points = placement.to_scene(pane.cloud.xyz[source.shown[drawn.at]])
+        colors = cloud_colors(source, drawn.at, settings.coloring, placement.rotation)
+        self._points(name, points, colors, settings.size * _point_size(drawn, placement))
 
-    def _draw_edges(self, number: int, pane: Pane, place: Place, settings: Settings) -> np.ndarray:
+    def _draw_edges(self, number: int, pane: Pane, placement: Placement, settings: Settings) -> np.ndarray:
         """Draw the edge points and their segments; return where the points are."""
         edges, name = pane.edges, f"/edges{number}"
-        side = _point_size(pane.source.drawn(settings), place)
+        side = _point_size(pane.source.drawn(settings), placement)
         key = (edges, side, settings.size, settings.by_strength, settings.tangents, settings.normals)
         if self._drawn.get(name) == key:
             return self.shown[number]
         self._drawn[name] = key
         points, colors, segments = np.empty((0, 3), np.float32), np.empty((0, 3), np.uint8), {}
         if edges is not None and len(edges):
-            points = place.to_scene(pane.cloud.xyz[edges.index])
+            points = placement.to_scene(pane.cloud.xyz[edges.index])
             colors = edge_colors(edges, by_strength=settings.by_strength, least=LEAST_STRENGTH)
-            rows = _spread(points) if settings.tangents or settings.normals else np.empty(0, np.int64)
+            few = _evenly_sampled(points) if settings.tangents or settings.normals else np.empty(0, np.int64)
             if settings.tangents:
-                segments["tangents"] = _tangents(edges.take(rows), points[rows], place)
+                segments["tangents"] = _tangents(edges.take(few), points[few], placement)
             if settings.normals:
-                segments["normals"] = _normals(edges.take(rows), points[rows], place)
+                segments["normals"] = _normals(edges.take(few), points[few], placement)
         drawn = points
         if edges is not None:
-            rise = np.where((edges.strength < LIKELY) & (edges.preset == "default"), _LOW_RISE, _RISE)
-            lift = (rise[:, None] * side * _outwards(edges, place)).astype(np.float32)
+            rise = np.where((edges.strength < LIKELY) & (edges.method != "paper"), _LOW_RISE, _RISE)
+            lift = (rise[:, None] * side * _outwards(edges, placement)).astype(np.float32)
             drawn, colors = np.concatenate([points + lift, points - lift]), np.concatenate([colors, colors])
         self._points(name, drawn, colors, settings.size * max(_EDGE * side, _LEAST_EDGE))
         for what in ("tangents", "normals"):
@@ -161,11 +162,11 @@ class Canvas:
         else:
             node.points, node.colors = segments
 
-    def _label(self, name: str, text: str, place: Place) -> None:
+    def _label(self, name: str, text: str, placement: Placement) -> None:
         if name not in self._nodes:
             assert self.layout is not None
             up = np.cross(self.layout.right, self.layout.away)
-            above = place.offset + (np.abs(up) @ place.half + _ABOVE) * up
+            above = placement.offset + (np.abs(up) @ placement.half + _ABOVE) * up
             self._nodes[name] = self._server.scene.add_label(name, text, position=above)
 
     def _remove(self, name: str) -> None:
@@ -179,21 +180,21 @@ class Canvas:
         self._drawn.clear()
 
 
-def _point_size(drawn: Drawn, place: Place) -> float:
+def _point_size(drawn: Drawn, placement: Placement) -> float:
     """Side of the points of a cloud, in scene units: their spacing, more where most lie farther apart than that."""
-    return float(max(_POINT * drawn.spacing * place.unit, min(3.0 / np.sqrt(max(len(drawn.at), 1)), _SPARSE)))
+    return float(max(_POINT * drawn.spacing * placement.unit, min(3.0 / np.sqrt(max(len(drawn.at), 1)), _SPARSE)))
 
 
-def _outwards(edges: Edges, place: Place) -> np.ndarray:
+def _outwards(edges: Edges, placement: Placement) -> np.ndarray:
     """Unit vectors off the surface, between the normals of both faces, in the scene (E, 3); 0 where none is known."""
     outwards = np.nan_to_num(edges.normals).sum(axis=1)
     length = np.linalg.norm(outwards, axis=1, keepdims=True)
-    return outwards / np.where(length > 0, length, 1.0) @ place.rotation.T
+    return outwards / np.where(length > 0, length, 1.0) @ placement.rotation.T
 
 
-def _tangents(edges: Edges, points: np.ndarray, place: Place) -> tuple[np.ndarray, np.ndarray]:
+def _tangents(edges: Edges, points: np.ndarray, placement: Placement) -> tuple[np.ndarray, np.ndarray]:
     """Segments along the edge, (S, 2, 3), and their colors, (S, 2, 3) uint8."""
-    along, normals = edges.direction @ place.rotation.T, edges.normals[:, 0] @ place.rotation.T
+    along, normals = edges.direction @ placement.rotation.T, edges.normals[:, 0] @ placement.rotation.T
     known = np.isfinite(along[:, 0])
     middle = (points + _LIFT * np.nan_to_num(normals))[known]
     half = _TANGENT / 2 * along[known]
@@ -201,11 +202,11 @@ def _tangents(edges: Edges, points: np.ndarray, place: Place) -> tuple[np.ndarra
     return ends, np.full((len(ends), 2, 3), _TANGENT_COLOR, np.uint8)
 
 
-def _normals(edges: Edges, points: np.ndarray, place: Place) -> tuple[np.ndarray, np.ndarray]:
+def _normals(edges: Edges, points: np.ndarray, placement: Placement) -> tuple[np.ndarray, np.ndarray]:
     """Segments along the normals of both faces, (S, 2, 3), and their colors, (S, 2, 3) uint8."""
     ends, colors = [], []
     for face, color in enumerate(_NORMAL_COLORS):
-        normals = edges.normals[:, face] @ place.rotation.T
+        normals = edges.normals[:, face] @ placement.rotation.T
         known = np.isfinite(normals[:, 0])
         start = points[known]
         ends.append(np.stack([start, start + _NORMAL * normals[known]], axis=1))
@@ -213,6 +214,6 @@ def _normals(edges: Edges, points: np.ndarray, place: Place) -> tuple[np.ndarray
     return np.concatenate(ends), np.concatenate(colors)
 
 
-def _spread(points: np.ndarray) -> np.ndarray:
-    """Rows of an even selection of the points: segments at all of them would be a carpet."""
+def _evenly_sampled(points: np.ndarray) -> np.ndarray:
+    """Return which of the points have segments: at all of them they would be a carpet."""
     return thin(points, _CELL) if len(points) >= 3 else np.arange(len(points))

@@ -47,7 +47,7 @@ def cloud_colors(source: Source, at: np.ndarray, coloring: Coloring, rotation: n
     source : Source
         Already read.
     at : (D,) int64
-        Places in `source.shown` of the points.
+        Indices into `source.shown` of the points to color.
     coloring : Coloring
         Grey where the file does not carry it.
     rotation : (3, 3) float64
@@ -80,10 +80,10 @@ def edge_colors(edges: Edges, *, by_strength: bool, least: float) -> np.ndarray:
     """Color edge points by their kind, unlikely ones paler, or by strength from `least` (light) to 1 (dark)."""
     if not by_strength:
         colors = kind_colors(edges.kind)
-        if edges.preset == "paper":
+        if edges.method == "paper":
             return colors
         doubt = np.clip(1.0 - edges.strength / LIKELY, 0.0, 1.0)[:, None]
         return (colors + doubt * (_PALE_GREY - colors.astype(np.float32)) + 0.5).astype(np.uint8)
-    if edges.preset == "paper":  # its strengths are shares of the largest step there can be: all small
+    if edges.method == "paper":  # its strengths are shares of the largest step there can be: all small
         return ramp_colors(1.0 - edges.strength / edges.strength.max(initial=1e-9))
     return ramp_colors((1.0 - edges.strength) / (1.0 - least))

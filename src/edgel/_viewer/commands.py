@@ -12,6 +12,8 @@ from edgel._viewer.session import Pane
 from edgel._viewer.settings import Settings
 from edgel.edges import kind_names
 
+_NO_KIND = "# no kind of edge is chosen"
+
 
 def command_line(pane: Pane, settings: Settings) -> str:
     """Write the ``edgel detect`` that finds exactly the edges of a pane."""
@@ -20,11 +22,11 @@ def command_line(pane: Pane, settings: Settings) -> str:
         words += ["--intrinsics", str(pane.source.intrinsics)]
     if settings.scale > 1:
         words += ["--scale", f"{settings.scale:g}"]
-    if pane.preset == "paper":
-        words += ["--preset", "paper"]
+    if pane.method == "paper":
+        words += ["--method", "paper"]
     else:
         if not settings.kinds:
-            return "# no kind of edge is chosen"
+            return _NO_KIND
         if settings.kinds != DEFAULT_KINDS:
             words += ["--kinds", ",".join(kind_names(settings.kinds))]
         if settings.strength != LIKELY:
@@ -38,23 +40,19 @@ def command_line(pane: Pane, settings: Settings) -> str:
 
 def python_lines(pane: Pane, settings: Settings) -> str:
     """Write the Python that finds exactly the edges of a pane."""
-    default = pane.preset == "default"
-    if default and not settings.kinds:
-        return "# no kind of edge is chosen"
-    options = []
-    if default and settings.kinds != DEFAULT_KINDS:
-        options.append(f"kinds={kind_names(settings.kinds)!r}")
-    if default and settings.strength != LIKELY:
-        options.append(f"min_strength={settings.strength:g}")
-    if not default:
-        options.append("preset='paper'")
+    imports, blunt = ["import edgel"], []
+    if pane.method == "paper":
+        scale = f", scale={settings.scale:g}" if settings.scale > 1 else ""
+        found = f"edgel.paper.detect(cloud{scale})"
+    else:
+        if not settings.kinds:
+            return _NO_KIND
+        found = f"edgel.detect({', '.join(['cloud', *_options(settings)])})"
+        if settings.angle > 0:
+            imports = ["import math", "", *imports]
+            blunt = [f"edges = edges.drop_blunt(math.radians({math.degrees(settings.angle):g}))"]
     camera = "" if pane.source.intrinsics is None else f", intrinsics={str(pane.source.intrinsics)!r}"
-    lines = ["import edgel", "", f"cloud = edgel.read({pane.source.path!r}{camera})"]
-    function = f"edgel.detect_at_scale(cloud, {settings.scale:g}" if settings.scale > 1 else "edgel.detect(cloud"
-    lines.append(f"edges = {', '.join([function, *options])})")
-    if default and settings.angle > 0:
-        lines[0] = "import math\n\nimport edgel"
-        lines.append(f"edges = edges.drop_blunt(math.radians({math.degrees(settings.angle):g}))")
+    lines = [*imports, "", f"cloud = edgel.read({pane.source.path!r}{camera})", f"edges = {found}", *blunt]
     if settings.is_cropped:
         corners = [", ".join(map(_number, corner)) for corner in pane.box.tolist()]
         lines.append(f"edges = edges.crop(cloud, [[{corners[0]}], [{corners[1]}]])")
@@ -64,7 +62,19 @@ def python_lines(pane: Pane, settings: Settings) -> str:
 
 def output_name(pane: Pane, extension: str = ".ply") -> str:
     """Return a name for the edges of a pane, in no folder."""
-    return f"{Path(pane.source.path).stem}_{'paper_' if pane.preset == 'paper' else ''}edges{extension}"
+    return f"{Path(pane.source.path).stem}_{'paper_' if pane.method == 'paper' else ''}edges{extension}"
+
+
+def _options(settings: Settings) -> list[str]:
+    """Write the arguments of `edgel.detect` that are not its defaults."""
+    options = []
+    if settings.scale > 1:
+        options.append(f"scale={settings.scale:g}")
+    if settings.kinds != DEFAULT_KINDS:
+        options.append(f"kinds={kind_names(settings.kinds)!r}")
+    if settings.strength != LIKELY:
+        options.append(f"min_strength={settings.strength:g}")
+    return options
 
 
 def _number(value: float) -> str:

@@ -9,13 +9,15 @@ from typing import Any
 import viser
 
 from edgel._viewer import texts
-from edgel._viewer.session import LEAST_STRENGTH, Pane
-from edgel._viewer.settings import MAX_SCALE, METHODS, Coloring, Settings
+from edgel._viewer.runs import LEAST_STRENGTH, METHODS, Method
+from edgel._viewer.session import Pane
+from edgel._viewer.settings import MAX_SCALE, Coloring, Settings
 from edgel._viewer.source import Source
 from edgel.edges import ASKABLE, EdgeKind, kind_names
 from edgel.io import WRITERS
 
 _EDGE_COLORS = ("kind", "strength")
+_SHOWN_METHODS: dict[str, tuple[Method, ...]] = {"edgel": ("edgel",), "paper": ("paper",), "side by side": METHODS}
 
 
 class Controls:
@@ -36,7 +38,7 @@ class Controls:
         with gui.add_folder("Edges"):
             self.legend = gui.add_html("")
             self.method = gui.add_dropdown(
-                "Method", tuple(METHODS), hint="edgel's own detector, the published method, or both side by side"
+                "Method", tuple(_SHOWN_METHODS), hint="edgel's own detector, the published method, or both side by side"
             )
             self.strength = gui.add_slider(
                 "Strength ≥", LEAST_STRENGTH, 1.0, 0.01, start.strength, hint="Hide edges weaker than this"
@@ -84,7 +86,7 @@ class Controls:
         for kind, box in self.kinds.items():
             kinds |= kind if box.value else EdgeKind(0)
         return Settings(
-            method=self.method.value,
+            methods=_SHOWN_METHODS[self.method.value],
             scale=max(float(self.scale.value), 1.0),
             strength=float(self.strength.value),
             angle=math.radians(self.angle.value),
@@ -104,14 +106,13 @@ class Controls:
         if self.coloring.options != names:
             self.coloring.options = names
         self.kinds[EdgeKind.COLOR].visible = any(source.has_color for source in sources)
-
         self.every_point.visible = any(len(source.few) < len(source.shown) for source in sources)
 
     def fit_method(self, settings: Settings) -> None:
         """Grey out what the method shown does not heed."""
         for handle in (self.strength, self.angle, *self.kinds.values()):
-            handle.disabled = "default" not in settings.presets
-        self.images.visible = "paper" in settings.presets
+            handle.disabled = "edgel" not in settings.methods
+        self.images.visible = "paper" in settings.methods
 
     def choose_pane(self, panes: list[Pane]) -> Pane | None:
         """Return the pane that saving is about, and offer the choice where there are several."""

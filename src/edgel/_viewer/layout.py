@@ -24,8 +24,8 @@ _SAME_SCALE = 10.0  # clouds that differ more in size are each made to fit
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
-    """How a cloud stands in the scene: turned, shrunk, moved.
+class Placement:
+    """How a cloud is placed in the scene: turned, scaled, moved.
 
     Attributes
     ----------
@@ -56,6 +56,19 @@ class Place:
 
 
 @dataclass(frozen=True, eq=False)
+class _Upright:
+    """A cloud turned upright: the rotation (3, 3), its centre (3,) before it, and half its extent (3,) after it."""
+
+    rotation: np.ndarray
+    centre: np.ndarray
+    half: np.ndarray
+
+    @property
+    def size(self) -> float:
+        return float(self.half.max()) or 1.0
+
+
+@dataclass(frozen=True, eq=False)
 class View:
     """Where to look from: position and target, (3,) float64 each, in the scene."""
 
@@ -69,7 +82,7 @@ class Layout:
 
     Attributes
     ----------
-    places : list of Place
+    placements : list of Placement
     points : (P, 3) float64
         Points of all clouds in the scene, without far ones: what the first view must show.
     away, right : (3,) float64
@@ -78,7 +91,7 @@ class Layout:
         Whether all clouds are drawn to the same scale.
     """
 
-    places: list[Place]
+    placements: list[Placement]
     points: np.ndarray
     away: np.ndarray
     right: np.ndarray
@@ -94,30 +107,30 @@ class Layout:
 
 def lay_out(sources: Sequence[Source]) -> Layout:
     """Place clouds, already read, in a row from left to right as seen in the first view."""
-    turned = [_turned(source) for source in sources]
-    sizes = [float(half.max()) or 1.0 for _, _, half in turned]
+    upright = [_turned(source) for source in sources]
+    sizes = [one.size for one in upright]
     same_scale = max(sizes) <= _SAME_SCALE * min(sizes)
     units = [1 / (max(sizes) if same_scale else size) for size in sizes]
     away = _LEVEL if all(source.camera.eye is not None for source in sources) else _OBLIQUE
     right = np.cross(away, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
-    widths = [2 * float(np.abs(right) @ half) * unit for (_, _, half), unit in zip(turned, units, strict=True)]
+    widths = [2 * float(np.abs(right) @ one.half) * unit for one, unit in zip(upright, units, strict=True)]
     left = -(sum(widths) + _GAP * (len(widths) - 1)) / 2
-    places, points = [], []
-    for source, (rotation, centre, half), unit, width in zip(sources, turned, units, widths, strict=True):
-        place = Place(rotation, centre, unit, (left + width / 2) * right, half * unit)
+    placements, points = [], []
+    for source, one, unit, width in zip(sources, upright, units, widths, strict=True):
+        placement = Placement(one.rotation, one.centre, unit, (left + width / 2) * right, one.half * unit)
         assert source.cloud is not None
-        seen = place.to_scene(source.cloud.xyz[source.shown[source.few]]).astype(float)
-        points.append(seen[in_box(seen, place.offset + 1.001 * place.half * [[-1], [1]])])
-        places.append(place)
+        seen = placement.to_scene(source.cloud.xyz[source.shown[source.few]]).astype(float)
+        points.append(seen[in_box(seen, placement.offset + 1.001 * placement.half * [[-1], [1]])])
+        placements.append(placement)
         left += width + _GAP
-    return Layout(places, np.concatenate(points), away, right, same_scale)
+    return Layout(placements, np.concatenate(points), away, right, same_scale)
 
 
-def _turned(source: Source) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rotation that makes a cloud stand upright, its centre, and half its extent after turning."""
+def _turned(source: Source) -> _Upright:
+    """Turn a cloud so that it stands upright: as its sensor saw it, if it is seen from there."""
     camera = source.camera
     rotation = np.eye(3) if camera.eye is None else np.stack([camera.right, -camera.back, camera.up])
     assert source.cloud is not None
     low, high = reach(source.cloud.xyz[source.shown] @ rotation.T)
-    return rotation, (low + high) / 2 @ rotation, (high - low) / 2
+    return _Upright(rotation, (low + high) / 2 @ rotation, (high - low) / 2)

@@ -144,7 +144,7 @@ class Page:
         names = [shown.name for shown in panes]
         if layout is not None and pane.name in names:
             away = client.camera.look_at - client.camera.position
-            direction = layout.places[names.index(pane.name)].to_cloud(away)
+            direction = layout.placements[names.index(pane.name)].to_cloud(away)
             self._send(event, lambda: picture_file(pane, direction, self._session.settings))
 
     def _saved_pane(self, event: viser.GuiEvent[Any]) -> Pane | None:

@@ -22,7 +22,7 @@ class Picked:
     pane : int
         Number of its pane.
     edge : int
-        Its place among the edges shown there.
+        Its number among the edges shown there.
     """
 
     pane: int
@@ -89,13 +89,13 @@ def find(panes: Sequence[Pane], row: Row) -> Picked | None:
     """Find an edge point again, or None where it is not shown any more."""
     for number, pane in enumerate(panes):
         if pane.name == row.pane and pane.edges is not None:
-            places = np.flatnonzero(pane.edges.index == row.row)
-            return Picked(number, int(places[0])) if len(places) else None
+            found = np.flatnonzero(pane.edges.index == row.row)
+            return Picked(number, int(found[0])) if len(found) else None
     return None
 
 
 def describe(pane: Pane, edge: int) -> dict[str, str]:
-    """Put into words what is known of an edge point of a pane, by its place among those shown."""
+    """Put into words what is known of an edge point of a pane, by its number among those shown."""
     assert pane.edges is not None
     edges = pane.edges
     row = int(edges.index[edge])

@@ -20,7 +20,7 @@ def select(edges: Edges, xyz: np.ndarray, settings: Settings, box: np.ndarray) -
     box : (2, 3) float64
         The crop box.
     """
-    if edges.preset == "default":
+    if edges.method != "paper":
         edges = edges.take(edges.strength >= settings.strength)
         if settings.angle > 0:
             edges = edges.drop_blunt(settings.angle)

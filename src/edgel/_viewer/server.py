@@ -12,6 +12,7 @@ import threading
 import webbrowser
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
+from dataclasses import dataclass
 
 import viser
 import websockets.asyncio.server
@@ -55,26 +56,33 @@ def serve(
     OSError
         If nothing can listen at that address.
     """
-    with running(paths, host=host, port=port, intrinsics=intrinsics) as (server, _, _):
-        shown = "localhost" if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
-        url = f"http://{shown}:{server.get_port()}"
-        ready(url)
+    with running(paths, host=host, port=port, intrinsics=intrinsics) as viewer:
+        ready(viewer.url)
         if open_browser and _has_screen():
-            webbrowser.open(url)
+            webbrowser.open(viewer.url)
         while True:
             threading.Event().wait(3600)  # in one endless wait Windows would not see Ctrl-C
+
+
+@dataclass(frozen=True, eq=False)
+class Viewer:
+    """The page while it is served: its address, the state behind it, and what draws it."""
+
+    url: str
+    session: Session
+    page: Page
 
 
 @contextmanager
 def running(
     paths: Sequence[str], *, host: str = LOCAL[0], port: int | None = None, intrinsics: str | None = None
-) -> Iterator[tuple[viser.ViserServer, Session, Page]]:
+) -> Iterator[Viewer]:
     """Serve the page for as long as the ``with`` lasts; as `serve`, which waits for Ctrl-C."""
     session = Session(paths, intrinsics=intrinsics)
     server = _listen(host, _free_port(host, port))
     page = Page(server, session)
     try:
-        yield server, session, page
+        yield Viewer(_address(host, server.get_port()), session, page)
     finally:
         session.close()
         page.close()
@@ -92,6 +100,12 @@ def _listen(host: str, port: int) -> viser.ViserServer:
             return viser.ViserServer(host, port, verbose=False)
     finally:
         websockets.asyncio.server.serve = original
+
+
+def _address(host: str, port: int) -> str:
+    """Return what to type into the browser of this machine."""
+    shown = "localhost" if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
+    return f"http://{shown}:{port}"
 
 
 def _free_port(host: str, port: int | None) -> int:

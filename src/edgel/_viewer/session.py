@@ -13,32 +13,21 @@ from typing import Any
 import numpy as np
 
 import edgel
-from edgel._detect import DEFAULT_KINDS
-from edgel._neighbors.thinning import detect_at_scale
 from edgel._viewer.latest import Latest
+from edgel._viewer.runs import Answer, Method, Run, find_edges
 from edgel._viewer.select import select
-from edgel._viewer.settings import Run, Settings
+from edgel._viewer.settings import Settings
 from edgel._viewer.source import Source
 from edgel.cloud import Cloud
-from edgel.edges import EdgeKind, Edges
+from edgel.edges import Edges
 from edgel.io.errors import describe_error
 
-LEAST_STRENGTH = 0.2  # what the detector is run with; the slider goes no lower
 _KEPT = 24  # answers remembered, so that moving back is immediate
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
-    """What came of a run: edges, or why there are none; and the seconds it took."""
-
-    edges: Edges | None
-    error: str
-    seconds: float
-
-
-@dataclass(frozen=True, eq=False)
 class Pane:
-    """One cloud with the edges of one preset.
+    """One cloud with the edges that one method found.
 
     Attributes
     ----------
@@ -48,7 +37,7 @@ class Pane:
         Already read.
     cloud : Cloud
         Its cloud.
-    preset : str
+    method : {"edgel", "paper"}
     run : Run or None
         The run whose edges are shown; None before the first is done.
     answer : Answer or None
@@ -64,7 +53,7 @@ class Pane:
     name: str
     source: Source
     cloud: Cloud
-    preset: str
+    method: Method
     run: Run | None
     answer: Answer | None
     edges: Edges | None
@@ -85,7 +74,7 @@ class Session:
     intrinsics : path, optional
         The camera of depth images.
     detect : callable
-        As `edgel.detect_at_scale`.
+        Runs a detector, as `find_edges` does.
     read : callable
         As `edgel.read`.
     """
@@ -95,7 +84,7 @@ class Session:
         paths: Sequence[str | os.PathLike[str]],
         *,
         intrinsics: str | os.PathLike[str] | None = None,
-        detect: Callable[..., Edges] = detect_at_scale,
+        detect: Callable[[Cloud, Run, Callable[[str], None]], Edges] = find_edges,
         read: Callable[..., Cloud] = edgel.read,
     ) -> None:
         self.sources = [Source(path, intrinsics=intrinsics, read=read) for path in paths]
@@ -107,8 +96,8 @@ class Session:
         self._changed: Callable[[], None] = lambda: None
         self._detect = detect
         self._answers: dict[Run, Answer] = {}
-        self._last: dict[tuple[int, str], Run] = {}
-        self._selected: dict[tuple[int, str], tuple[Any, Edges]] = {}
+        self._last: dict[tuple[int, Method], Run] = {}
+        self._selected: dict[tuple[int, Method], tuple[Any, Edges]] = {}
         self._closed = False
         self._worker = Latest(self._work, "edgel view detector")
 
@@ -137,50 +126,50 @@ class Session:
         return self._worker.wait_idle(timeout)
 
     def panes(self, settings: Settings | None = None) -> list[Pane]:
-        """Return what is to be seen now: one pane for each readable file and preset, files first."""
+        """Return what is to be seen now: one pane for each readable file and method, files first."""
         settings = settings or self._settings
         return [
-            self._pane(number, preset, settings)
+            self._pane(number, method, settings)
             for number, source in enumerate(self.sources)
             if source.cloud is not None
-            for preset in settings.presets
+            for method in settings.methods
         ]
 
-    def _pane(self, number: int, preset: str, settings: Settings) -> Pane:
+    def _pane(self, number: int, method: Method, settings: Settings) -> Pane:
         source = self.sources[number]
         assert source.cloud is not None
-        wanted = self._wanted_run(number, preset, settings)
-        run = wanted if wanted in self._answers else self._last.get((number, preset))
+        wanted = self._wanted_run(number, method, settings)
+        run = wanted if wanted in self._answers else self._last.get((number, method))
         answer = None if run is None else self._answers.get(run)
         box = settings.box(source.low, source.high)
         edges = None
         if answer is not None and answer.edges is not None:
-            edges = self._select(number, preset, answer, settings)
+            edges = self._select(number, method, answer, settings)
         name = source.name
-        if len(settings.presets) > 1:
-            name += " · paper" if preset == "paper" else " · edgel"
-        return Pane(name, source, source.cloud, preset, run, answer, edges, box, run == wanted)
+        if len(settings.methods) > 1:
+            name += f" · {method}"
+        return Pane(name, source, source.cloud, method, run, answer, edges, box, run == wanted)
 
-    def _select(self, number: int, preset: str, answer: Answer, settings: Settings) -> Edges:
+    def _select(self, number: int, method: Method, answer: Answer, settings: Settings) -> Edges:
         """Return the edges of an answer that the settings show, the same object for as long as they are the same."""
         cloud, source = self.sources[number].cloud, self.sources[number]
         assert cloud is not None
         assert answer.edges is not None
         key = (answer, settings.strength, settings.angle, settings.kinds, settings.crop)
-        last = self._selected.get((number, preset))
+        last = self._selected.get((number, method))
         if last is None or last[0] != key:
             edges = select(answer.edges, cloud.xyz, settings, settings.box(source.low, source.high))
-            last = self._selected[number, preset] = key, edges
+            last = self._selected[number, method] = key, edges
         return last[1]
 
-    def _wanted_run(self, number: int, preset: str, settings: Settings) -> Run:
-        return settings.run(number, preset, has_color=self.sources[number].has_color)
+    def _wanted_run(self, number: int, method: Method, settings: Settings) -> Run:
+        return settings.run(number, method, has_color=self.sources[number].has_color)
 
     def _wanted(self) -> list[Run]:
         """Return the runs that the settings of this moment need."""
         settings = self._settings
         readable = [number for number, source in enumerate(self.sources) if source.cloud is not None]
-        return [self._wanted_run(number, preset, settings) for number in readable for preset in settings.presets]
+        return [self._wanted_run(number, method, settings) for number in readable for method in settings.methods]
 
     def _work(self) -> None:
         for source in self.sources:
@@ -197,6 +186,8 @@ class Session:
 
     def _answer(self, run: Run) -> None:
         """Run the detector and keep what comes of it."""
+        cloud = self.sources[run.source].cloud
+        assert cloud is not None
 
         def progress(stage: str) -> None:
             if self._closed or run not in self._wanted():
@@ -205,19 +196,9 @@ class Session:
 
         start = time.perf_counter()
         edges, error = None, ""
-        options: dict[str, Any] = {}
-        if run.preset == "default":
-            kinds = DEFAULT_KINDS | EdgeKind.COLOR if run.color else DEFAULT_KINDS
-            options = {"kinds": kinds, "min_strength": LEAST_STRENGTH}
         try:
             progress("start")
-            edges = self._detect(
-                self.sources[run.source].cloud,
-                run.scale,
-                preset=run.preset,
-                progress=progress,
-                **options,
-            )
+            edges = self._detect(cloud, run, progress)
         except Superseded:
             return
         except MemoryError:
@@ -238,7 +219,7 @@ class Session:
         for old in spare[: max(len(answers) - _KEPT, 0)]:
             del answers[old]
         self._answers = answers  # a new one each time: other threads read it meanwhile
-        self._last[run.source, run.preset] = run
+        self._last[run.source, run.method] = run
         self._changed()
 
     def _say(self, what: str) -> None:

@@ -8,11 +8,9 @@ from enum import Enum
 import numpy as np
 
 from edgel._detect import DEFAULT_KINDS
-from edgel._labels import LIKELY, PRESETS
+from edgel._labels import LIKELY
+from edgel._viewer.runs import Method, Run
 from edgel.edges import EdgeKind
-
-METHODS = {"edgel": ("default",), "paper": ("paper",), "side by side": PRESETS}
-"""Presets shown by each choice of the page."""
 
 MAX_SCALE = 10.0
 
@@ -28,39 +26,18 @@ class Coloring(Enum):
 
 
 @dataclass(frozen=True)
-class Run:
-    """One run of the detector: everything else only filters what it found.
-
-    Attributes
-    ----------
-    source : int
-        Which file.
-    preset : {"default", "paper"}
-    scale : float
-        See `Settings`.
-    color : bool
-        Whether edges of the colors are looked for.
-    """
-
-    source: int
-    preset: str
-    scale: float = 1.0
-    color: bool = False
-
-
-@dataclass(frozen=True)
 class Settings:
     """Everything on the page that decides what is seen.
 
     Attributes
     ----------
-    method : str
-        One of `METHODS`.
+    methods : tuple of {"edgel", "paper"}
+        The methods whose edges are shown, side by side.
     scale : float
         Edges larger than this many times the median spacing are found: the detector runs on the cloud thinned to one
         point a voxel of that size. 1: on all points.
     strength : float
-        Least strength of an edge point of the default detector.
+        Least strength of an edge point that `edgel.detect` found.
     angle : float
         Least angle of a crease, in radians.
     kinds : EdgeKind
@@ -73,12 +50,12 @@ class Settings:
     tangents, normals : bool
         Whether they are drawn as segments.
     every_point : bool
-        Whether all points of the cloud are drawn, however many, else an even part of them.
+        Whether all points of the cloud are drawn, however many, else an evenly sampled part of them.
     size : float
         Size of the points, in their usual one.
     """
 
-    method: str = "edgel"
+    methods: tuple[Method, ...] = ("edgel",)
     scale: float = 1.0
     strength: float = LIKELY
     angle: float = 0.0
@@ -92,19 +69,14 @@ class Settings:
     size: float = 1.0
 
     @property
-    def presets(self) -> tuple[str, ...]:
-        """The presets shown."""
-        return METHODS[self.method]
-
-    @property
     def is_cropped(self) -> bool:
         """Whether anything is cut off."""
         return any(pair != (0.0, 1.0) for pair in self.crop)
 
-    def run(self, source: int, preset: str, *, has_color: bool) -> Run:
+    def run(self, source: int, method: Method, *, has_color: bool) -> Run:
         """Return the run that answers these settings for a file; `has_color`: whether it has any colors."""
-        color = preset == "default" and has_color and EdgeKind.COLOR in self.kinds
-        return Run(source, preset, self.scale, color)
+        color = method == "edgel" and has_color and EdgeKind.COLOR in self.kinds
+        return Run(source, method, self.scale, color)
 
     def box(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
         """Return the crop box of a cloud that reaches from `low` to `high`, (2, 3); infinite where nothing is cut."""

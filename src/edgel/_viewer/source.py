@@ -34,7 +34,7 @@ class Drawn:
     Attributes
     ----------
     at : (D,) int64
-        Their places in `Source.shown`.
+        Indices into `Source.shown`.
     spacing : float
         Median distance to the nearest neighbour that is drawn too, in the cloud's unit.
     whole : bool
@@ -65,7 +65,7 @@ class Source:
     shown : (S,) int64
         Rows that can be drawn: the finite ones, or a random part of them.
     few : (F,) int64
-        Places in `shown` of at most `FEW` that lie evenly, which are drawn until all are asked for.
+        Indices into `shown` of at most `FEW`, evenly sampled, which are drawn until all are asked for.
     normals : (S, 3) float32 or None
         Of the rows `shown`; None until `estimate_normals` was called.
     spacing : float
@@ -100,7 +100,7 @@ class Source:
         return self.cloud is not None or bool(self.error)
 
     def drawn(self, settings: Settings) -> Drawn:
-        """Return which of the points are drawn: all in the crop box, or an even part where they are too many."""
+        """Return which of the points are drawn: all in the crop box, or, of too many, some evenly sampled."""
         key = (settings.crop, settings.every_point)
         last = self._last
         if last is None or last[0] != key:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
 from io import BytesIO, TextIOWrapper
 from itertools import islice
 from typing import BinaryIO
@@ -14,8 +13,9 @@ from edgel.cloud import Cloud
 from edgel.io.columns import find_xyz, fits_float32, flat_attributes, one_line
 from edgel.io.errors import FormatError
 from edgel.io.files import reading, replacing
-from edgel.io.ply_header import NAMES, Element, Header, range_grid, read_header
-from edgel.io.ply_lists import gather, walk_rows
+from edgel.io.ply_grid import range_grid, read_grid, spread
+from edgel.io.ply_header import NAMES, Element, Header, cut_off, read_header
+from edgel.io.ply_lists import gather, skip, walk
 from edgel.io.rows import number_of, parse_text, read_binary, reject_row, remaining_bytes, write_binary
 
 
@@ -69,7 +69,8 @@ def _read(path: str, file: BinaryIO) -> Cloud:
     cloud = _to_cloud(path, header, xyz, attributes)
     grid = range_grid(header)
     if cloud.shape is None and grid is not None:
-        return _spread(path, cloud, *_read_grid(path, file, header, *grid))
+        position, shape = grid
+        return spread(path, cloud, read_grid(path, file, header, position), shape)
     return cloud
 
 
@@ -79,11 +80,7 @@ def _check_size(path: str, header: Header, vertex: Element, file: BinaryIO) -> N
     row = 2 * len(vertex.properties) if header.ascii else vertex.min_row
     if vertex.count * row - header.ascii > size:  # the last line of a text may lack its end
         found = sum(bool(line.strip()) for line in file) if header.ascii else size // row
-        raise _cut_off(path, vertex.count, min(found, vertex.count))
-
-
-def _cut_off(path: str, declared: int, found: int) -> FormatError:
-    return FormatError(f"{path}: declared {declared} vertices, found {found}; the file is cut off: get it again")
+        raise cut_off(path, vertex.count, min(found, vertex.count))
 
 
 def _read_ascii(
@@ -96,7 +93,7 @@ def _read_ascii(
     rows = list(lines)
     text.detach()
     if len(rows) < vertex.count:
-        raise _cut_off(path, vertex.count, len(rows))
+        raise cut_off(path, vertex.count, len(rows))
     if any(p.length_code for p in vertex.properties):
         rows = [_without_lists(path, row, vertex) for row in rows]
     scalars = [p for p in vertex.properties if p.length_code is None]
@@ -132,95 +129,23 @@ def _read_binary(
     path: str, file: BinaryIO, header: Header, skipped: list[Element], vertex: Element, axes: list[str]
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     for element in skipped:
-        _skip(path, file, header, element)
+        skip(path, file, header, element)
     if any(p.length_code for p in vertex.properties):
         columns = _read_with_lists(path, file, header, vertex)
         return np.column_stack([columns.pop(name).astype(np.float64) for name in axes]), columns
     if vertex.count * vertex.min_row > remaining_bytes(file):
-        raise _cut_off(path, vertex.count, remaining_bytes(file) // vertex.min_row)
+        raise cut_off(path, vertex.count, remaining_bytes(file) // vertex.min_row)
     dtype = np.dtype([(p.name, header.order + p.code) for p in vertex.properties])
     return read_binary(file, dtype, vertex.count, axes)
 
 
-def _skip(path: str, file: BinaryIO, header: Header, element: Element) -> None:
-    if not any(p.length_code for p in element.properties):
-        if element.count * element.min_row > remaining_bytes(file):
-            raise FormatError(
-                f"{path}: the data ends within element {element.name!r}; the file is cut off: get it again"
-            )
-        file.seek(element.count * element.min_row, 1)
-        return
-    _walk(path, file, header, element, keep=False)
-
-
-def _walk(path: str, file: BinaryIO, header: Header, element: Element, *, keep: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Pass over an element with lists; return the bytes it lies in and where each value begins."""
-    if element.count * element.min_row > remaining_bytes(file):
-        raise _cut_off(path, element.count, remaining_bytes(file) // element.min_row)
-    start = file.tell()
-    data = np.frombuffer(file.read(), np.uint8)
-    sizes = np.array([np.dtype(p.code).itemsize for p in element.properties], np.int64)
-    lengths = np.array([np.dtype(p.length_code).itemsize if p.length_code else 0 for p in element.properties], np.int64)
-    offsets = np.empty((element.count if keep else 0, len(sizes)), np.int64)
-    end = walk_rows(data, 0, element.count, sizes, lengths, header.order == ">", offsets)
-    if end < 0:
-        raise FormatError(
-            f"{path}: declared {element.count} of element {element.name!r}, the data ends in number {-1 - end}; "
-            "the file is cut off or a list length is wrong: get it again"
-        )
-    file.seek(start + end)
-    return data, offsets
-
-
 def _read_with_lists(path: str, file: BinaryIO, header: Header, vertex: Element) -> dict[str, np.ndarray]:
-    data, offsets = _walk(path, file, header, vertex, keep=True)
+    data, offsets = walk(path, file, header, vertex, keep=True)
     return {
         p.name: gather(data, offsets[:, i], np.dtype(header.order + p.code))
         for i, p in enumerate(vertex.properties)
         if p.length_code is None
     }
-
-
-def _read_grid(
-    path: str, file: BinaryIO, header: Header, position: int, shape: tuple[int, int]
-) -> tuple[np.ndarray, tuple[int, int]]:
-    """Read which vertex each cell of a range grid holds (-1: none)."""
-    grid = header.elements[position]
-    if header.ascii:
-        file.seek(header.size)
-        lines = (line for line in file if not line.isspace())
-        first = sum(element.count for element in header.elements[:position])
-        cells = [line.split() for line in islice(lines, first, first + grid.count)]
-        good = len(cells) == grid.count
-        good = good and all(cell == [b"0"] or (cell[0] == b"1" and len(cell) == 2) for cell in cells)
-        if not good or not all(cell[-1].isdigit() for cell in cells):
-            raise FormatError(f"{path}: element range_grid is cut off, or a cell holds several points; get it again")
-        return np.array([int(cell[1]) if cell[0] == b"1" else -1 for cell in cells]), shape
-    for element in header.elements[header.index("vertex") + 1 : position]:
-        _skip(path, file, header, element)
-    data, offsets = _walk(path, file, header, grid, keep=True)
-    length = np.dtype(header.order + (grid.properties[0].length_code or ""))
-    filled = gather(data, offsets[:, 0], length) == 1
-    index = np.full(grid.count, -1, np.int64)
-    starts = offsets[filled, 0] + length.itemsize
-    index[filled] = gather(data, starts, np.dtype(header.order + grid.properties[0].code))
-    return index, shape
-
-
-def _spread(path: str, cloud: Cloud, index: np.ndarray, shape: tuple[int, int]) -> Cloud:
-    """Put the points of a range grid into their cells; the others become NaN (attributes that have no NaN: 0)."""
-    if len(index) and index.max() >= len(cloud):
-        raise FormatError(
-            f"{path}: range_grid names vertex {index.max()} of {len(cloud)}; the file is damaged: get it again"
-        )
-    filled = index >= 0
-    xyz = np.full((len(index), 3), np.nan)
-    xyz[filled] = cloud.xyz[index[filled]]
-    attributes = {}
-    for name, values in cloud.attributes.items():
-        attributes[name] = np.full(len(index), np.nan if values.dtype.kind == "f" else 0, values.dtype)
-        attributes[name][filled] = values[index[filled]]
-    return replace(cloud, xyz=xyz, attributes=attributes, shape=shape)
 
 
 def _to_cloud(path: str, header: Header, xyz: np.ndarray, attributes: dict[str, np.ndarray]) -> Cloud:

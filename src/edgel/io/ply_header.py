@@ -91,15 +91,9 @@ def read_header(path: str, file: BinaryIO) -> Header:
     return _parse_header(path, lines, file.tell())
 
 
-def range_grid(header: Header) -> tuple[int, tuple[int, int]] | None:
-    """Return position and shape of Stanford's range_grid element behind the vertices, None when there is none."""
-    names = [element.name for element in header.elements]
-    if header.shape is None or "range_grid" not in names[names.index("vertex") :]:
-        return None
-    position = names.index("range_grid", names.index("vertex"))
-    grid = header.elements[position]
-    lists = [p.length_code is not None for p in grid.properties]
-    return (position, header.shape) if grid.count == header.shape[0] * header.shape[1] and lists == [True] else None
+def cut_off(path: str, declared: int, found: int) -> FormatError:
+    """Return the error of a file that holds fewer vertices than its header says."""
+    return FormatError(f"{path}: declared {declared} vertices, found {found}; the file is cut off: get it again")
 
 
 def _parse_header(path: str, lines: list[str], size: int) -> Header:

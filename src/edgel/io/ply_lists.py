@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from typing import BinaryIO
+
 import numpy as np
 
 from edgel._kernels.parallel import kernel
+from edgel.io.errors import FormatError
+from edgel.io.ply_header import Element, Header, cut_off
+from edgel.io.rows import remaining_bytes
 
 
 @kernel
-def walk_rows(
+def _walk_rows(
     data: np.ndarray,
     start: int,
     count: int,
@@ -64,3 +69,34 @@ def gather(data: np.ndarray, offsets: np.ndarray, dtype: np.dtype) -> np.ndarray
     """Read one value of `dtype` at each offset of the bytes `data`, in native byte order."""
     raw = data[offsets[:, None] + np.arange(dtype.itemsize)]
     return np.ascontiguousarray(raw).view(dtype)[:, 0].astype(dtype.newbyteorder("="))
+
+
+def skip(path: str, file: BinaryIO, header: Header, element: Element) -> None:
+    """Pass over an element of a binary file."""
+    if not any(p.length_code for p in element.properties):
+        if element.count * element.min_row > remaining_bytes(file):
+            raise FormatError(
+                f"{path}: the data ends within element {element.name!r}; the file is cut off: get it again"
+            )
+        file.seek(element.count * element.min_row, 1)
+        return
+    walk(path, file, header, element, keep=False)
+
+
+def walk(path: str, file: BinaryIO, header: Header, element: Element, *, keep: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Pass over an element with lists; return its bytes and, if they are to be kept, where each value begins."""
+    if element.count * element.min_row > remaining_bytes(file):
+        raise cut_off(path, element.count, remaining_bytes(file) // element.min_row)
+    start = file.tell()
+    data = np.frombuffer(file.read(), np.uint8)
+    sizes = np.array([np.dtype(p.code).itemsize for p in element.properties], np.int64)
+    lengths = np.array([np.dtype(p.length_code).itemsize if p.length_code else 0 for p in element.properties], np.int64)
+    offsets = np.empty((element.count if keep else 0, len(sizes)), np.int64)
+    end = _walk_rows(data, 0, element.count, sizes, lengths, header.order == ">", offsets)
+    if end < 0:
+        raise FormatError(
+            f"{path}: declared {element.count} of element {element.name!r}, the data ends in number {-1 - end}; "
+            "the file is cut off or a list length is wrong: get it again"
+        )
+    file.seek(start + end)
+    return data, offsets

@@ -189,7 +189,7 @@ def _parse(path: str, lines: list[str], data: list[str], layout: _Layout) -> dic
     axes = find_xyz(layout.names) if layout.names else None
     coordinates = {layout.names.index(axis) for axis in axes} if layout.names and axes else {0, 1, 2}
     error: Exception = ValueError()
-    # The sample may be whole by chance, or hold numbers beyond int64: then the next type in line.
+    # The sample may happen to be whole, or hold numbers beyond int64: then the next type in line.
     for integer in ("i8", "u8", "f8") if any(whole) else ("f8",):
         codes = [integer if whole[i] and i not in coordinates else "f8" for i in range(width)]
         try:

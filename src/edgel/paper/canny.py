@@ -57,7 +57,7 @@ def canny(image: np.ndarray, *, kernel_size: int, sigma: float, low: float, high
     smoothed = smooth(image, kernel_size, sigma)
     gx, gy = gradient(smoothed)
     magnitude = np.hypot(gx, gy)
-    return CannyResult(smoothed, magnitude, hysteresis(thin(magnitude, gx, gy), low, high))
+    return CannyResult(smoothed, magnitude, hysteresis(non_maximum_suppression(magnitude, gx, gy), low, high))
 
 
 def gaussian_kernel(kernel_size: int, sigma: float) -> np.ndarray:
@@ -94,7 +94,7 @@ def gradient(image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return gx, gy
 
 
-def thin(magnitude: np.ndarray, gx: np.ndarray, gy: np.ndarray) -> np.ndarray:
+def non_maximum_suppression(magnitude: np.ndarray, gx: np.ndarray, gy: np.ndarray) -> np.ndarray:
     """Suppress what is not the largest of the three pixels along the gradient's direction (section 3.3 of the paper).
 
     The direction is rounded to one of four, as OpenCV does; of two equal pixels side by side the lower or right one
@@ -106,7 +106,7 @@ def thin(magnitude: np.ndarray, gx: np.ndarray, gy: np.ndarray) -> np.ndarray:
         The magnitude where it is a maximum, 0 elsewhere.
     """
     out = np.zeros_like(magnitude)
-    _thin(np.pad(magnitude, 1), gx, gy, out)
+    _suppress(np.pad(magnitude, 1), gx, gy, out)
     return out
 
 
@@ -131,7 +131,7 @@ def _gaussian_weights(kernel_size: int, sigma: float) -> np.ndarray:
 
 
 @kernel
-def _thin(padded, gx, gy, out):
+def _suppress(padded, gx, gy, out):
     tan_22, tan_67 = 0.41421356237309503, 2.414213562373095
     height, width = gx.shape
     for row in range(height):

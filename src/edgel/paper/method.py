@@ -13,10 +13,11 @@ from typing import Any, Self
 
 import numpy as np
 
-from edgel._neighbors.candidates import at_points
 from edgel._neighbors.kdtree import bounds, build_index
 from edgel._neighbors.normals import Normals, by_offset, check_num_neighbors, fit_planes_within, no_planes
+from edgel._neighbors.queries import at_points
 from edgel._neighbors.spacing import occupied_spacing
+from edgel._scale import at_scale, check_scale
 from edgel._stages import Stages
 from edgel.cloud import check_points
 from edgel.edges import EdgeKind, Edges, one_face
@@ -74,6 +75,7 @@ def detect(
     tolerance: float | None = None,
     gray_min: float = 100.0,
     num_neighbors: int = 16,
+    scale: float = 1.0,
     progress: Callable[[str], None] | None = None,
 ) -> PaperEdges:
     """Find edge points and their normals as the paper does.
@@ -98,6 +100,8 @@ def detect(
         Grey of the lowest point, 0 to 255 (eq. 5); 0 is where no point falls.
     num_neighbors : int
         k of the plane fits (step 9).
+    scale : float
+        Side of the voxels to one point of which the cloud is thinned first, in median spacings; at 1 it is not thinned.
     progress : callable, optional
         Called with the name of each stage as it begins.
 
@@ -124,6 +128,18 @@ def detect(
         raise ValueError(f"gray_min: expected a grey level from 0 to 255, got {gray_min}")
     checked = check_points(points)
     check_num_neighbors(num_neighbors, len(checked.xyz))
+    check_scale(scale)
+    if scale > 1:
+        options = {
+            "width": width,
+            "height": height,
+            "kernel_size": kernel_size,
+            "sigma": sigma,
+            "low": low,
+            "high": high,
+        }
+        options |= {"tolerance": tolerance, "gray_min": gray_min, "num_neighbors": num_neighbors}
+        return at_scale(detect, points, scale, progress=progress, **options)
     stages = Stages(progress)
     with stages("projection"):
         grid = choose_grid(checked.xyz, width, height)

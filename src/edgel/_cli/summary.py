@@ -1,0 +1,80 @@
+"""What ``edgel detect`` says of the edges it found: as a table, and as JSON."""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+from edgel._cli.output import count, seconds
+from edgel.edges import EdgeKind, Edges
+
+
+def creases(edges: Edges) -> dict[str, Any]:
+    """Return the median angle of the creases, in degrees (NaN where none is known), and how many bend which way."""
+    convex = edges.convex[(edges.kind & EdgeKind.CREASE) > 0]
+    return {
+        "median_angle_degrees": math.degrees(edges.median_crease_angle),
+        "convex": int((convex > 0).sum()),
+        "concave": int((convex < 0).sum()),
+    }
+
+
+def crease_remark(edges: Edges) -> str:
+    """Say of the creases what is known of both their faces."""
+    known = creases(edges)
+    angle = known["median_angle_degrees"]
+    words = [] if math.isnan(angle) else [f"median angle {angle:.1f} degrees"]
+    return ", ".join(words + [f"{count(known[name])} {name}" for name in ("convex", "concave") if known[name]])
+
+
+def collect(
+    source: str, output: str | None, page: Path | None, edges: Edges, by_stage: dict[str, float]
+) -> dict[str, Any]:
+    """Return what ``--json`` prints."""
+    return {
+        "input": source,
+        "output": output,
+        "report": None if page is None else str(page),
+        "method": edges.method,
+        "reason": edges.reason,
+        "points": edges.num_points,
+        "not_finite": edges.num_dropped,
+        "edge_points": len(edges),
+        "share": edges.share,
+        "kinds": edges.count_kinds(),
+        "creases": creases(edges),
+        "normals_undefined": edges.num_without_normal,
+        "parameters": edges.parameters,
+        "seconds": by_stage,
+        "peak_memory_bytes": peak_memory(),
+    }
+
+
+def summary(edges: Edges, by_stage: dict[str, float]) -> list[tuple[str, ...]]:
+    """Return the rows of the table."""
+    rows: list[tuple[str, ...]] = [("points", count(edges.num_points))]
+    if edges.num_dropped:
+        rows.append(("not finite", count(edges.num_dropped), "left out"))
+    rows.append(("edge points", count(len(edges)), f"{edges.share:.1%} of the finite points"))
+    for name, number in edges.count_kinds().items():
+        rows.append((f"  {name}", count(number), crease_remark(edges) if name == "crease" else ""))
+    if edges.num_without_normal:
+        rows.append(("normals undefined", count(edges.num_without_normal), "the neighbours span no plane"))
+    rows.append(("method", edges.method, edges.reason))
+    rows.append(("time", seconds(sum(by_stage.values()))))
+    rows += [(f"  {name}", seconds(duration)) for name, duration in by_stage.items()]
+    if (peak := peak_memory()) is not None:
+        rows.append(("memory", f"{peak / 1e6:,.0f} MB", "at most, that of the program itself included"))
+    return rows
+
+
+def peak_memory() -> int | None:
+    """Return the most memory this process has held, in bytes, None where the system does not tell."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return None
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak if sys.platform == "darwin" else peak * 1024

@@ -1,0 +1,60 @@
+"""The choice of a view."""
+
+import numpy as np
+import pytest
+from test_range_image import camera, grid, sphere
+
+from edgel import Cloud
+from edgel._range_image.view import best_view, count_rings
+
+
+def hill():
+    xyz = grid(60, 60).reshape(-1, 3)
+    xyz[:, 2] = 3 * np.sin(xyz[:, 0] / 9)
+    return xyz
+
+
+@pytest.mark.parametrize(
+    ("cloud", "method"),
+    [
+        (Cloud(camera()), "organized"),
+        (Cloud(hill()), "surface"),
+        (Cloud(camera().reshape(-1, 3), viewpoint=np.zeros(3)), "pinhole"),
+        (Cloud(sphere(), viewpoint=np.array([0.2, 0.1, 0.0])), "spherical"),
+        (Cloud(sphere(), viewpoint=np.array([0.0, 0.0, 50.0])), "surface"),
+        (Cloud(sphere()), "surface"),
+    ],
+)
+def test_choice_of_a_view(cloud, method):
+    chosen = best_view(cloud, cloud.xyz)
+    assert chosen.method == method
+    assert "\n" not in chosen.reason
+
+
+def sweep(levels=16, empty=0):
+    """What a spinning sensor at the origin sees of a room, `empty` shots without an echo among it."""
+    azimuth, elevation = np.meshgrid(np.arange(0, 2 * np.pi, 0.005), np.radians(np.linspace(-15, 15, levels)))
+    rays = np.stack([np.cos(azimuth), np.sin(azimuth), np.tan(elevation)], axis=-1).reshape(-1, 3)
+    room = rays * (4 / np.abs(rays[:, :2]).max(axis=1, keepdims=True))
+    return np.concatenate([room, np.zeros((empty, 3))])
+
+
+@pytest.mark.parametrize("empty", [0, 500])
+def test_a_spinning_sensor_is_known_by_its_rings(empty):
+    xyz = sweep(empty=empty)
+    view = best_view(Cloud(xyz), xyz)
+    assert view.method == "spherical"
+    assert "16 rings" in view.reason
+    assert view.image is not None
+    shown = view.image.index[view.image.index >= 0]
+    assert np.isin(np.arange(len(xyz) - empty), shown).mean() > 0.99
+    assert not np.isin(np.arange(len(xyz) - empty, len(xyz)), shown).any()
+
+
+def test_no_rings_where_there_are_none():
+    rng = np.random.default_rng(1)
+    assert count_rings(rng.standard_normal((20000, 3))) == 0
+    assert count_rings(grid(200, 200).reshape(-1, 3) + (1.0, 1.0, 5.0)) == 0
+    assert count_rings(sweep()[:500]) == 0  # too few to tell
+    flat = np.column_stack([rng.uniform(-50, 50, (20000, 2)), 0.1 * rng.standard_normal(20000)])
+    assert count_rings(np.concatenate([flat, rng.uniform(-60, 60, (200, 3))])) == 0  # outliers all round are no rings

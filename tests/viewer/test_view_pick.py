@@ -1,0 +1,48 @@
+"""Clicks in the viewer: which edge point was meant, and its numbers."""
+
+import numpy as np
+from hall import TIMEOUT
+
+from edgel import EdgeKind
+from edgel._viewer.pick import Picked, describe, find, pick, row_of
+from edgel._viewer.settings import Settings
+
+
+def test_clicks_choose_the_foremost():
+    far, near = np.array([[0.0, 10.0, 0.0]]), np.array([[0.5, 3.0, 0.0], [0.01, 3.0, 0.0]])
+    ray = np.zeros(3), np.array([0.0, 2.0, 0.0])
+    assert pick([far, near], *ray, max_angle=0.01) == Picked(1, 1)
+    assert pick([far, near[:1]], *ray, max_angle=0.01) == Picked(0, 0)
+    assert pick([far[:0], near[:1]], *ray, max_angle=0.01) is None
+    assert pick([far[:0], near[:1]], *ray, max_angle=0.01, radius=0.6) == Picked(1, 0)
+    assert pick([-far], *ray, max_angle=0.01) is None
+    assert pick([], *ray, max_angle=0.01) is None
+
+
+def test_a_clicked_point_is_found_again(open_session, hall_file):
+    session = open_session([hall_file])
+    assert session.wait_idle(TIMEOUT)
+    panes = session.panes()
+    assert panes[0].edges is not None
+    weak, strong = int(panes[0].edges.strength.argmin()), int(panes[0].edges.strength.argmax())
+    rows = [row_of(panes, Picked(0, edge)) for edge in (weak, strong)]
+    fewer = session.panes(Settings(strength=float(panes[0].edges.strength[strong])))
+    assert find(fewer, rows[0]) is None
+    found = find(fewer, rows[1])
+    assert found is not None
+    assert row_of(fewer, found) == rows[1]
+    assert find([], rows[0]) is None
+
+
+def test_numbers_of_an_edge_point(open_session, hall_file):
+    session = open_session([hall_file])
+    assert session.wait_idle(TIMEOUT)
+    (pane,) = session.panes()
+    assert pane.edges is not None
+    crease = int(np.flatnonzero(pane.edges.kind == EdgeKind.CREASE)[0])
+    numbers = describe(pane, crease)
+    assert numbers["kind"] == "crease"
+    assert numbers["row"].startswith(f"{pane.edges.index[crease]:,}")
+    assert numbers["angle"] == f"{np.degrees(pane.edges.angle[crease]):.1f}°"
+    boundary = int(np.flatnonzero(pane.edges.kind == EdgeKind.BOUNDARY)[0])
+    assert describe(pane, boundary)["other face's normal"] == "unknown"
