@@ -38,7 +38,7 @@ def test_screening_features_are_in_the_layouts(made):
     assert found.features.shape == (asked.sum(), NUM_SCREEN)
     assert np.array_equal(np.sort(found.points), np.flatnonzero(asked))
     assert found.leaves.shape == (found.leaf.max() + 1, len(LEAF))
-    statistics = cloud_statistics(build_index(made.xyz)).values
+    statistics = cloud_statistics(build_index(made.xyz))
     for rows, layout in ((found.features, POINT), (found.leaves, LEAF)):
         np.testing.assert_array_equal(rows[:, layout.block("cloud")], np.broadcast_to(statistics, (len(rows), 8)))
     np.testing.assert_array_equal(np.bincount(found.leaf), found.leaves[:, LEAF.column("leaf.count")])

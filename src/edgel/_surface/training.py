@@ -40,7 +40,7 @@ class ScreeningFeatures:
 def screening_features(xyz: np.ndarray, asked: np.ndarray) -> ScreeningFeatures:
     """Describe all leaves of a cloud (N, 3), and the points asked for, (N,) bool."""
     index = build_index(np.ascontiguousarray(xyz))
-    values = cloud_statistics(index).values
+    values = cloud_statistics(index)
     places = np.flatnonzero(asked[index.order])
     leaf = np.empty(len(index), np.int64)
     sizes = np.diff(leaf_starts(index))
