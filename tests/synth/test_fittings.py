@@ -1,10 +1,10 @@
 """The fittings: their meshes end and bend where their edges say, which are drawn exactly."""
 
 from dataclasses import FrozenInstanceError
-from pipes import BEND, BOUNDS, END, PARTS, R, distance_to_surface, height, lengths
 
 import numpy as np
 import pytest
+from closed_forms import BEND, BOUNDS, END, PARTS, R, distance_to_surface, height, lengths
 
 from edgel import synth
 

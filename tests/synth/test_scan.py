@@ -4,10 +4,10 @@ import doctest
 import importlib
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pipes import BEND, BOUNDS, END, PARTS, R, distance_to_surface, height, lengths
 
 import numpy as np
 import pytest
+from closed_forms import BEND, BOUNDS, END, PARTS, R, distance_to_surface, height, lengths
 
 from edgel import synth
 from edgel.edges import EdgeKind
