@@ -4,7 +4,7 @@ from dataclasses import FrozenInstanceError
 
 import numpy as np
 import pytest
-from closed_forms import BEND, BOUNDS, END, PARTS, R, distance_to_surface, height, lengths
+from exact_fittings import BEND, BOUNDS, END, PARTS, R, distance_to_surface, height, lengths
 
 from edgel import synth
 

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 import pytest
-from closed_forms import BEND, BOUNDS, END, PARTS, R, distance_to_surface, height, lengths
+from exact_fittings import BEND, BOUNDS, END, PARTS, R, distance_to_surface, height, lengths
 
 from edgel import synth
 from edgel.edges import EdgeKind
