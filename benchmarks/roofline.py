@@ -17,10 +17,10 @@ import numpy as np
 
 from edgel import synth
 from edgel._kernels.parallel import kernel, run_slices
-from edgel._neighbors.candidates import every_place, every_point
 from edgel._neighbors.kdtree import _SHARED_LEVELS, bounds, build_index
 from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.normals import by_offset, fit_planes
+from edgel._neighbors.queries import every_place, every_point
 from edgel._neighbors.spacing import occupied_spacing
 from edgel._surface import classify, cloud_statistics, screen
 from edgel.paper.method import canny_of_projection, choose_grid, choose_tolerance, local_plane_fits

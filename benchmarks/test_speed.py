@@ -17,10 +17,10 @@ import pytest
 
 import edgel
 from edgel import paper, synth
-from edgel._neighbors.candidates import every_point
 from edgel._neighbors.kdtree import bounds, build_index
 from edgel._neighbors.knn import knn
 from edgel._neighbors.normals import fit_planes
+from edgel._neighbors.queries import every_point
 from edgel.io import ply
 from edgel.paper.canny import canny
 from edgel.paper.method import choose_grid
