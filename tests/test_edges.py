@@ -52,7 +52,7 @@ def test_counts_and_shares():
     assert edges.count_kinds() == {"boundary": 1, "occluded": 1, "crease": 2}
     assert edges.median_crease_angle == pytest.approx((np.pi / 2 + np.arccos(0.8)) / 2)
     assert np.isnan(edges.of_kinds("occluded").median_crease_angle)
-    assert repr(edges) == "Edges(3 of 5 points, 75.0%, 1 not finite; preset default, method surface)"
+    assert repr(edges) == "Edges(3 of 5 points, 75.0%, 1 not finite; method surface)"
 
 
 def test_those_inside_a_box():
