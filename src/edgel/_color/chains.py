@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from edgel._kernels.parallel import kernel
+from edgel._kernels.union_find import find_root
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.queries import every_point
@@ -98,19 +99,11 @@ def _follow(links, strong, kept):
     for row in range(len(links)):
         for other in links[row]:
             if other >= 0:
-                a, b = _root(parents, row), _root(parents, other)
+                a, b = find_root(parents, row), find_root(parents, other)
                 parents[max(a, b)] = min(a, b)
     holds = np.zeros(len(links), np.bool_)
     for row in range(len(links)):
         if strong[row]:
-            holds[_root(parents, row)] = True
+            holds[find_root(parents, row)] = True
     for row in range(len(links)):
-        kept[row] = holds[_root(parents, row)]
-
-
-@kernel
-def _root(parents, row):
-    while parents[row] != row:
-        parents[row] = parents[parents[row]]
-        row = parents[row]
-    return row
+        kept[row] = holds[find_root(parents, row)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from edgel._kernels.parallel import kernel
+from edgel._kernels.union_find import find_root
 
 FAINTEST = 0.05  # of the level 1: what lies below is not looked at
 
@@ -34,14 +35,6 @@ def levels(values: np.ndarray, weak: float, least: int) -> np.ndarray:
     found = np.zeros(len(padded))
     _join(order, padded, values.shape[1] + 2, weak, least, found)
     return found.reshape(values.shape[0] + 2, -1)[1:-1, 1:-1]
-
-
-@kernel
-def _root(parent, pixel):
-    while parent[pixel] != pixel:
-        parent[pixel] = parent[parent[pixel]]
-        pixel = parent[pixel]
-    return pixel
 
 
 @kernel
@@ -75,7 +68,7 @@ def _join(order, values, width, weak, least, found):
                 beside = pixel + r * width + c
                 if parent[beside] < 0:
                     continue
-                a, b = _root(parent, beside), _root(parent, pixel)
+                a, b = find_root(parent, beside), find_root(parent, pixel)
                 if a == b:
                     continue
                 _settle(a, value, weak, least, values, size, since, following, head, found)
