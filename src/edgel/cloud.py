@@ -9,6 +9,10 @@ from typing import Any
 
 import numpy as np
 
+LARGEST = 1e30
+"""Largest coordinate, in magnitude: squares of distances stay far from overflow and offsets fit single precision. In
+nanometres that is a hundred thousand light years."""
+
 
 @dataclass(frozen=True, eq=False)
 class Cloud:
@@ -67,6 +71,11 @@ class Cloud:
 
     def __len__(self) -> int:
         return len(self.xyz)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle and copy: the read-only views of the mappings are made anew."""
+        parts = (self.xyz, dict(self.attributes), self.shape, self.viewpoint, self.crs, dict(self.metadata))
+        return type(self), parts
 
     def __repr__(self) -> str:
         form = f"organized {self.shape[0]} x {self.shape[1]}" if self.shape else "unorganized"
@@ -149,17 +158,19 @@ def check_points(points: Any, *, minimum: int = 3) -> Points:
     Raises
     ------
     TypeError, ValueError
-        If `points` carries no coordinates, or fewer than `minimum` finite ones.
+        If `points` carries no coordinates, or fewer than `minimum` finite ones, or one beyond `LARGEST`.
     """
     xyz = as_cloud(points).xyz
-    # A sum is finite only if all its terms are: one pass, no (N, 3) mask for the usual clean cloud.
+    # The squares sum up to so little only if none is NaN, infinite or too large: one pass, no (N, 3) mask for the usual
+    # clean cloud.
     with np.errstate(over="ignore", invalid="ignore"):
-        clean = np.isfinite(xyz.sum())
+        clean = bool(np.vdot(xyz, xyz) <= LARGEST**2)
     if clean:
         rows = np.arange(len(xyz))
     else:
         rows = np.flatnonzero(np.isfinite(xyz).all(axis=1))
         xyz = xyz if len(rows) == len(xyz) else xyz[rows]
+        _check_size(xyz, rows, "points")
     if len(rows) < minimum:
         found = (
             f"{len(rows)} finite points of {len(as_cloud(points))}" if len(rows) < len(as_cloud(points)) else len(rows)
@@ -183,11 +194,34 @@ def check_rows(at: Any, num_points: int) -> np.ndarray:
     return rows
 
 
+def check_positions(positions: Any, name: str) -> np.ndarray:
+    """Check positions (M, 3), all of which have to be finite and within `LARGEST`, and return them as float64."""
+    xyz = np.ascontiguousarray(positions, dtype=np.float64)
+    if xyz.ndim != 2 or xyz.shape[1] != 3:
+        raise ValueError(f"{name}: expected shape (M, 3), got {xyz.shape}")
+    bad = np.flatnonzero(~np.isfinite(xyz).all(axis=1))
+    if len(bad):
+        raise ValueError(f"{name}: row {bad[0]} is not finite ({xyz[bad[0]].tolist()}); leave such rows out")
+    _check_size(xyz, np.arange(len(xyz)), name)
+    return xyz
+
+
+def _check_size(xyz: np.ndarray, rows: np.ndarray, name: str) -> None:
+    """Refuse finite coordinates (M, 3) beyond `LARGEST`; `rows` (M,) are their rows in the input."""
+    large = np.flatnonzero((np.abs(xyz) > LARGEST).any(axis=1))
+    if len(large):
+        where = f"row {rows[large[0]]}" + (f" and {len(large) - 1:,} more" if len(large) > 1 else "")
+        raise ValueError(
+            f"{name}: {where} has a coordinate beyond {LARGEST:g} ({xyz[large[0]].tolist()}), too far for distances to "
+            "be computed; leave it out, or choose a larger unit"
+        )
+
+
 def as_vector(value: Any, name: str) -> np.ndarray:
-    """Check a finite (3,) vector and return it as float64."""
+    """Check a finite (3,) vector within `LARGEST` and return it as float64."""
     vector = np.asarray(value, dtype=np.float64)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise ValueError(f"{name}: expected three finite numbers, got {value!r}")
+    if vector.shape != (3,) or not (np.abs(vector) <= LARGEST).all():
+        raise ValueError(f"{name}: expected three finite numbers of at most {LARGEST:g} in magnitude, got {value!r}")
     return vector
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import Neighbors, knn
+from edgel.cloud import check_positions
 from edgel.edges import EdgeKind
 
 IGNORE = 2
@@ -233,8 +234,17 @@ def kind_confusion(predicted: np.ndarray, truth: np.ndarray) -> np.ndarray:
 
 
 def nearest(positions: np.ndarray, among: np.ndarray) -> Neighbors:
-    """Return the nearest of `among` (T, 3), T > 0, of each position (M, 3)."""
-    return knn(build_index(np.ascontiguousarray(among)), np.ascontiguousarray(positions), 1)
+    """Return the nearest of `among` (T, 3), T > 0, of each position (M, 3).
+
+    Raises
+    ------
+    ValueError
+        If a position is not finite, or there are none to be nearest.
+    """
+    among = check_positions(among, "among")
+    if len(among) == 0:
+        raise ValueError("among: there are no positions; give at least one")
+    return knn(build_index(among), check_positions(positions, "positions"), 1)
 
 
 def _both_ways(predicted: np.ndarray, truth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -56,6 +56,11 @@ def _pool(threads: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(threads, thread_name_prefix="edgel")
 
 
+# A forked child inherits the pool without its threads, and would wait for them for ever: it makes its own.
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_pool.cache_clear)
+
+
 def run_slices(compiled: Callable[..., Any], count: int, *arguments: Any, size: int = 8192) -> None:
     """Call ``compiled(start, stop, *arguments)`` for consecutive slices of ``range(count)``, in parallel.
 

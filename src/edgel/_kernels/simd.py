@@ -23,7 +23,7 @@ from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
-from numba.core import types
+from numba.core import config, types
 from numba.core.errors import TypingError
 from numba.core.typeconv.castgraph import Conversion  # pyright: ignore[reportPrivateImportUsage]
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
@@ -128,9 +128,15 @@ def _call(builder: Any, name: str, *operands: Any) -> Any:
     return builder.call(function, operands)
 
 
-def _place(context: Any, builder: Any, kind: Any, array: Any, i: Any) -> Any:
-    data = context.make_array(kind)(context, builder, array).data
-    return builder.bitcast(builder.gep(data, [i]), Floats.llvm.as_pointer())
+def _place(context: Any, builder: Any, kind: Any, array: Any, i: Any, *, checked: bool = True) -> Any:
+    made = context.make_array(kind)(context, builder, array)
+    if checked and config.BOUNDSCHECK:  # pyright: ignore[reportAttributeAccessIssue]
+        size, zero = builder.extract_value(made.shape, 0), ir.Constant(i.type, 0)
+        end = builder.add(i, ir.Constant(i.type, LANES))
+        outside = builder.or_(builder.icmp_signed("<", i, zero), builder.icmp_signed(">", end, size))
+        with builder.if_then(outside, likely=False):
+            context.call_conv.return_user_exc(builder, IndexError, ("eight numbers beyond the end of an array",))
+    return builder.bitcast(builder.gep(made.data, [i]), Floats.llvm.as_pointer())
 
 
 def _check(array: Any) -> None:
@@ -145,6 +151,20 @@ def load(typing: Any, array: Any, i: Any) -> Any:
 
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return builder.load(_place(context, builder, sig.args[0], *args), align=8)
+
+    return floats(array, types.intp), build
+
+
+@_intrinsic
+def load_padded(typing: Any, array: Any, i: Any) -> Any:
+    """Read array[i : i + 8] where the array ends before, and whoever made it left memory behind it.
+
+    Unlike `load` it is not checked under ``NUMBA_BOUNDSCHECK``.
+    """
+    _check(array)
+
+    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.load(_place(context, builder, sig.args[0], *args, checked=False), align=8)
 
     return floats(array, types.intp), build
 

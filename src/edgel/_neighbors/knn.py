@@ -91,7 +91,7 @@ def visit_neighbors(
     asked, tree = queries.arrays, tree_of(index)
 
     def work(start: int, stop: int) -> None:
-        places = np.empty((stop - start, num_neighbors), np.int64)
+        places = np.zeros((stop - start, num_neighbors), np.int64)  # a place even where no distance is a number
         squared = np.empty((stop - start, num_neighbors))
         _list(start, stop, asked, tree, places, squared)
         visit(start, places, squared, queries.xyz, queries.targets, index.xyz, *arguments)
@@ -131,7 +131,7 @@ def _take(scratch, count, lane, points, distances):
         for j in range(LANES):
             d = squared[(i * LANES + j) * LANES + lane]
             points[kept], distances[kept] = first + j, d  # written in any case: no branch to guess
-            kept += d <= limit
+            kept = min(kept + (d <= limit), len(points) - 1)  # k always, were every distance a number
 
 
 @part
@@ -160,7 +160,7 @@ def _rank(tree, points, distances, ranks, places, squared):
             squared[slot], places[slot] = d, point
         return
     for i in range(k):
-        slot = int(ranks[i])
+        slot = min(int(ranks[i]), k - 1)
         squared[slot], places[slot] = distances[i], points[i]
 
 

@@ -125,7 +125,9 @@ def _settle(tree, scratch, count, k, lane):
     low, high, missing = scratch.limits[lane], scratch.ends[lane], k
     for i in range(count * LANES):
         missing -= squared[i * LANES + lane] <= low
-    nearest, kept = np.empty(missing, np.int64), 0
+    if missing < 1:  # no distance between the limits is a number
+        return
+    nearest, kept = np.zeros(missing, np.int64), 0
     for i in range(count * LANES):
         d = squared[i * LANES + lane]
         if d <= low or d > high:

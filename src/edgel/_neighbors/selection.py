@@ -5,7 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from edgel._kernels.parallel import kernel
-from edgel._kernels.simd import LANES, as_floats, counted, counts_of, larger, largest_of, load, spread, store, where
+from edgel._kernels.simd import (
+    LANES,
+    as_floats,
+    counted,
+    counts_of,
+    larger,
+    largest_of,
+    load,
+    load_padded,
+    spread,
+    store,
+    where,
+)
 
 _RANKED = 64  # so few keys are ranked by counting
 _SAMPLE, _SPREAD = 32, 4  # keys of a sample, and how many of them lie between the median and either end of a window
@@ -114,7 +126,7 @@ def sort_leaf(axis, xyz, order, to_xyz, to_order, first, last, ranks):
     to_key, to_second, to_third = to_xyz[axis], to_xyz[(axis + 1) % 3], to_xyz[(axis + 2) % 3]
     count, total = last - first, 0
     for p in range(0, count, LANES):
-        v, before = load(key, first + p), counts_of(0)
+        v, before = load_padded(key, first + p), counts_of(0)
         for q in range(first, last):
             before = counted(before, v > key[q])
         store(ranks, p, as_floats(before))

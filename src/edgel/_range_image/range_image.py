@@ -21,6 +21,7 @@ _SAMPLE = 2000  # points at which the evenness of the image is looked at
 _RINGS = 0.25  # nearest neighbours this much flatter than 45 degrees lie on scan lines along the rows
 _GRID, _EVEN = 0.9, 0.75  # nearest neighbours of a grid are 1 spacing away, those of random points 0.5
 _LOOSE = 1.3  # pixels of random points are this much larger than their spacing, or a third would be empty
+_GRAZING = 1e-6  # cosine to the optical axis from which a point lies beside the camera
 _MOST_PIXELS = 50  # for each point
 
 
@@ -143,7 +144,7 @@ def pinhole(xyz: np.ndarray, viewpoint: np.ndarray) -> RangeImage:
     rays = xyz - viewpoint
     right, down, forward = _axes(rays.mean(axis=0), np.array([0.0, 0.0, 1.0]))
     ahead = rays @ forward
-    if not (ahead > 0).all():
+    if not (ahead > _GRAZING * np.linalg.norm(rays, axis=1)).all():
         raise ValueError("viewpoint: some points lie beside or behind a camera there; use a spherical projection")
     picture = np.column_stack([rays @ right / ahead, rays @ down / ahead])
     return _rastered(xyz, picture, np.linalg.norm(rays, axis=1), "pinhole", viewpoint, forward)
