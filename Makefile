@@ -4,13 +4,17 @@ VENV := .venv
 LOCK := --no-emit-index-url --no-header --python-version 3.11
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint bench bench-quick install lock clean
+.PHONY: demo test checked lint bench bench-quick install lock clean
 
 demo: install
 	$(BIN)/edgel demo -o demo
 
 test: install lint
 	$(BIN)/pytest
+
+# The kernels with every index checked: none reads or writes outside its arrays.
+checked: install
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(CURDIR)/$(VENV)/checked $(BIN)/pytest -q tests/kernels tests/neighbors tests/surface/test_evidence.py tests/range_image tests/color tests/test_golden.py
 
 lint: install
 	$(BIN)/ruff check .

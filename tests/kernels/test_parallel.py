@@ -5,8 +5,12 @@ import os
 import subprocess
 import sys
 import textwrap
+from concurrent.futures import ThreadPoolExecutor
 
+import numpy as np
 import pytest
+
+import edgel
 
 USE = """
 import multiprocessing, sys, threading
@@ -45,3 +49,14 @@ def test_children_of_a_process_that_has_used_edgel_answer_the_same(start, tmp_pa
         check=False,
     )
     assert done.stdout == "same\n", done.stderr
+
+
+def test_many_threads_at_once_answer_as_one():
+    x, y = np.meshgrid(np.arange(60.0), np.arange(60.0))
+    roofs = [np.c_[x.ravel(), y.ravel(), -slope * abs(x.ravel() - 30)] for slope in (0.5, 1.0, 2.0)]
+    alone = [edgel.detect(roof) for roof in roofs]
+    with ThreadPoolExecutor(6) as pool:
+        together = list(pool.map(edgel.detect, roofs * 6))
+    for number, found in enumerate(together):
+        for name in ("index", "kind", "strength", "normals"):
+            np.testing.assert_array_equal(getattr(found, name), getattr(alone[number % 3], name))

@@ -1,5 +1,9 @@
 """Eight numbers in step do what NumPy does."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -60,3 +64,32 @@ def test_lanes_do_what_numpy_does(a, b):
 def test_lanes_refuse_what_is_not_contiguous():
     with pytest.raises(TypingError, match="contiguous"):
         _operate(np.zeros(16)[::2], np.zeros(8), np.empty(88))
+
+
+def test_a_checked_build_refuses_to_read_or_write_beyond_an_array(tmp_path):
+    """``NUMBA_BOUNDSCHECK=1`` reaches the lanes too, so that `make checked` can find what writes outside."""
+    code = """
+import numpy as np
+from numba import njit
+from edgel._kernels import simd
+
+@njit
+def read(a, i):
+    return simd.largest_of(simd.load(a, i))
+
+@njit
+def write(a, i):
+    simd.store(a, i, simd.spread(1.0))
+
+for use in (read, write):
+    use(np.zeros(16), 8)
+    for size, i in ((8, 1), (15, 8), (16, -1), (0, 0)):
+        try:
+            use(np.zeros(size), i)
+        except IndexError:
+            continue
+        print("not refused", use, size, i)
+"""
+    environment = os.environ | {"NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=False)
+    assert (done.returncode, done.stdout) == (0, ""), done.stderr
