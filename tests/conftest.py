@@ -18,3 +18,7 @@ def shared_data() -> Path:
 settings.register_profile("local", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "local")
+
+# The source distribution holds the package and its tests, not what they would need here.
+ROOT = Path(__file__).parent.parent
+collect_ignore = [name for name in ("benchmarks", "training") if not (ROOT / name).is_dir()]
