@@ -13,6 +13,7 @@ from edgel._cli.errors import exit_codes
 from edgel._cli.output import count, length, print_line
 from edgel._cli.progress import Watch
 from edgel.cloud import Cloud
+from edgel.io.columns import as_table
 
 HELP = """Convert a cloud from any format to any other, with all it carries.
 
@@ -92,7 +93,7 @@ def differences(cloud: Cloud, kept: Cloud) -> list[str]:
 
 
 def _attribute(name: str, values: np.ndarray, kept: Cloud) -> list[str]:
-    columns = values.reshape(len(values), -1)
+    columns = as_table(values)
     if name in kept.attributes:
         parts = [kept.attributes[name]]
     elif values.ndim > 1 and all(f"{name}_{i}" in kept.attributes for i in range(columns.shape[1])):
@@ -101,7 +102,7 @@ def _attribute(name: str, values: np.ndarray, kept: Cloud) -> list[str]:
         parts = [kept.attributes[f"{name}_exact"]]
     else:
         return [f"{name}: left out"]
-    copy = np.column_stack([part.reshape(len(values), -1) for part in parts])
+    copy = np.column_stack([as_table(part) for part in parts])
     numbers = values.dtype.kind == "f" and copy.dtype.kind == "f"
     if copy.shape != columns.shape or not np.array_equal(copy, columns, equal_nan=numbers):
         return [f"{name}: values changed"]
