@@ -45,7 +45,8 @@ def flat_attributes(cloud: Cloud, path: object, *, keep_arrays: bool = False) ->
         parts = {word: values}
         if values.ndim > 1:
             table = as_table(values)
-            parts = {word: table} if keep_arrays else {f"{word}_{i}": table[:, i] for i in range(table.shape[1])}
+            whole = keep_arrays and table.shape[1]  # no column at all has nowhere to go
+            parts = {word: table} if whole else {f"{word}_{i}": table[:, i] for i in range(table.shape[1])}
         for part, column in parts.items():
             if part in columns or part.lower() in ("x", "y", "z"):
                 raise FormatError(f"{path}: two columns would be called {part!r}; rename attribute {name!r}")

@@ -69,7 +69,9 @@ def write(path: str | os.PathLike[str], cloud: Cloud) -> None:
     columns = _fields(path, cloud)
     with replacing(path) as file:
         if not isinstance(file.name, str):
-            raise FormatError(f"{os.fspath(path)}: E57 goes into no pipe or device; write a file, or .ply into the pipe")
+            raise FormatError(
+                f"{os.fspath(path)}: E57 goes into no pipe or device; write a file, or .ply into the pipe"
+            )
         try:
             with _uninterrupted():
                 image = lib.ImageFile(file.name, "w")
