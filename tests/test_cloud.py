@@ -129,3 +129,27 @@ def test_clouds_and_answers_can_be_pickled_and_copied(clone):
         assert repr(again) == repr(edges)
     planes = clone(edgel.estimate_normals(cloud))
     assert len(planes) == 400
+
+
+def test_what_is_masked_is_missing():
+    mask = np.arange(12).reshape(4, 3) == 4
+    points = np.ma.masked_array(np.arange(12).reshape(4, 3), mask)
+    missing = np.ma.masked_array(np.arange(4), [True, False, False, False])
+    attributes = {name: missing.astype(name) for name in ("float32", "float64", "int16", "int64", "bool")}
+    cloud = edgel.Cloud(points, attributes)
+    assert np.array_equal(np.isnan(cloud.xyz), mask)
+    assert check_points(points).rows.tolist() == [0, 2, 3]
+    assert check_points(list(points)).rows.tolist() == [0, 2, 3]
+    for name, values in cloud.attributes.items():
+        assert np.isnan(values).tolist() == [True, False, False, False]
+        assert values.dtype == (name if name.startswith("float") else np.float64)
+    whole = edgel.Cloud(np.ma.masked_array(np.eye(3)), {"id": np.ma.masked_array([1, 2, 3])})
+    assert whole.attributes["id"].dtype == int
+    assert type(whole.xyz) is np.ndarray
+
+
+@pytest.mark.parametrize("values", [["a", "b", "c"], [2**60, 1, 2]])
+def test_a_mask_that_a_type_cannot_say_is_refused(values):
+    masked = np.ma.masked_array(values, [False, True, False])
+    with pytest.raises(ValueError, match="attribute 'name': some are masked"):
+        edgel.Cloud(np.eye(3), {"name": masked})

@@ -157,3 +157,17 @@ def test_no_edges_can_be_written_too(tmp_path, suffix):
     found = edgel.read(tmp_path / f"a{suffix}")
     assert len(found) == 0
     assert {*LABELS, *MORE} <= set(found.attributes)
+
+
+def test_columns_of_the_input_make_room():
+    points = np.random.default_rng(0).random((300, 3))
+    edges = edgel.paper.detect(points)
+    own = {name: np.arange(300.0) for name in ("NX", "ny", "input_ny", "tx", "label", " edge_kind")}
+    whole, some = edges.label(edgel.Cloud(points, own)), edges.to_cloud(edgel.Cloud(points, own))
+    for cloud, rows in ((whole, np.arange(300)), (some, edges.index)):
+        for name in ("input_NX", "input_ny_2", "input_ny", "label", "input_edge_kind"):
+            assert np.array_equal(cloud.attributes[name], rows)
+        assert cloud.attributes["edge_kind"].dtype == np.uint8
+        assert not {"NX", " edge_kind"} & set(cloud.attributes)
+    assert np.array_equal(whole.attributes["tx"], np.arange(300))  # label has no tangent
+    assert np.array_equal(some.attributes["input_tx"], edges.index)

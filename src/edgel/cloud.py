@@ -23,7 +23,8 @@ class Cloud:
     xyz : (N, 3) float64
         Coordinates in the cloud's own unit and frame; NaN or inf where an organized sensor saw nothing.
     attributes : mapping of str to (N,) or (N, C) array
-        Everything else known per point, by the name its file gave it (``intensity``, ``red``, ``label``...).
+        Everything else known per point, by the name its file gave it (``intensity``, ``red``, ``label``...). What is
+        masked, here and in `xyz`, is missing: NaN, for which integers become float64.
     shape : (int, int) or None
         Rows and columns of an organized cloud (``N == rows * columns``, row-major), None when unorganized.
     viewpoint : (3,) float64 or None
@@ -58,7 +59,7 @@ class Cloud:
             raise ValueError(f"shape {tuple(shape)} of an organized cloud does not hold its {len(xyz)} points")
         attributes = {}
         for name, values in self.attributes.items():
-            array = np.asarray(values)
+            array = unmasked(values, f"attribute {name!r}")
             if array.ndim == 0 or len(array) != len(xyz):
                 raise ValueError(f"attribute {name!r} has shape {array.shape}; its first axis must be {len(xyz)} long")
             attributes[name] = array
@@ -142,7 +143,7 @@ def as_cloud(points: Any) -> Cloud:
         return points
     for attribute in ("xyz", "points"):
         if not isinstance(points, np.ndarray) and hasattr(points, attribute):
-            return Cloud(np.asarray(getattr(points, attribute)))
+            return Cloud(unmasked(getattr(points, attribute), "points"))
     return Cloud(points)
 
 
@@ -219,10 +220,29 @@ def _check_size(xyz: np.ndarray, rows: np.ndarray, name: str) -> None:
 
 def as_vector(value: Any, name: str) -> np.ndarray:
     """Check a finite (3,) vector within `LARGEST` and return it as float64."""
-    vector = np.asarray(value, dtype=np.float64)
+    vector = np.asarray(unmasked(value, name), dtype=np.float64)
     if vector.shape != (3,) or not (np.abs(vector) <= LARGEST).all():
         raise ValueError(f"{name}: expected three finite numbers of at most {LARGEST:g} in magnitude, got {value!r}")
     return vector
+
+
+def unmasked(values: Any, name: str) -> np.ndarray:
+    """Make an array, NaN where it was masked (`numpy.ma`); integers and flags become float64 for that.
+
+    Raises
+    ------
+    ValueError
+        If something is masked and the type has no NaN: texts, records, integers beyond 2^53.
+    """
+    if isinstance(values, list | tuple) and any(map(np.ma.isMaskedArray, values)):
+        values = np.ma.array(values)
+    if not np.ma.is_masked(values):
+        return np.asarray(values)
+    numbers = values.astype(np.float64) if values.dtype.kind in "biu" else values
+    beyond = values.dtype.kind in "iu" and np.abs(numbers.compressed()).max(initial=0) > 2**53
+    if numbers.dtype.kind not in "fc" or beyond:
+        raise ValueError(f"{name}: some are masked, and {values.dtype} has no NaN for them; fill them (.filled(value))")
+    return numbers.filled(np.nan)
 
 
 def in_box(xyz: np.ndarray, box: np.ndarray) -> np.ndarray:
@@ -231,7 +251,7 @@ def in_box(xyz: np.ndarray, box: np.ndarray) -> np.ndarray:
 
 
 def _coordinates(xyz: Any) -> np.ndarray:
-    array = np.asarray(xyz)
+    array = unmasked(xyz, "points")
     if array.dtype.kind not in "fiu":
         raise TypeError(
             f"points: expected numbers of shape (N, 3) or (H, W, 3), got {type(xyz).__name__} ({array.dtype})"

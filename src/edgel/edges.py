@@ -9,6 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from edgel._columns import make_room
 from edgel.cloud import Cloud, as_cloud, in_box
 
 
@@ -31,6 +32,13 @@ class EdgeKind(IntFlag):
 
 ASKABLE = EdgeKind.BOUNDARY | EdgeKind.OCCLUDING | EdgeKind.OCCLUDED | EdgeKind.CREASE | EdgeKind.COLOR
 """The kinds that a detector can be asked for; `EdgeKind.IMAGE` is the published method's alone."""
+
+FIRST_COLUMNS = ("edge_kind", "edge_strength", "edge_angle", "edge_convex", "nx", "ny", "nz")
+"""What `Edges.label` adds to a cloud, and `Edges.to_cloud` before its own."""
+_FACE_COLUMNS, _TANGENT_COLUMNS = ("nx2", "ny2", "nz2"), ("tx", "ty", "tz")
+_PLACE_COLUMNS = ("edge_x", "edge_y", "edge_z")
+ALL_COLUMNS = (*FIRST_COLUMNS, *_FACE_COLUMNS, *_TANGENT_COLUMNS, *_PLACE_COLUMNS)
+"""What `Edges.to_cloud` adds."""
 
 _PER_POINT = ("index", "kind", "strength", "position", "direction", "normals", "angle", "convex")
 
@@ -158,20 +166,26 @@ class Edges:
 
         That is ``edge_kind`` (uint8), ``edge_strength``, ``edge_angle`` (radians), ``edge_convex`` (int8), the normals
         ``nx ny nz`` and ``nx2 ny2 nz2`` of the two faces, the tangent ``tx ty tz``, and the refined position ``edge_x
-        edge_y edge_z`` (float64); float32 but for those named otherwise, NaN where unknown.
+        edge_y edge_z`` (float64); float32 but for those named otherwise, NaN where unknown. Attributes of the input
+        that have one of these names are kept as ``input_nx`` and so on, ``input_nx_2``
+        where that is there too, as after a second run.
         """
-        cloud = self._describe(as_cloud(points).take(self.index), np.arange(len(self)))
-        columns = _columns(self.normals[:, 1], ("nx2", "ny2", "nz2"), np.float32)
-        columns |= _columns(self.direction, ("tx", "ty", "tz"), np.float32)
-        columns |= _columns(self.position, ("edge_x", "edge_y", "edge_z"), np.float64)
+        cloud = make_room(as_cloud(points).take(self.index), ALL_COLUMNS)
+        columns = self._describe(len(self), np.arange(len(self)))
+        columns |= _columns(self.normals[:, 1], _FACE_COLUMNS, np.float32)
+        columns |= _columns(self.direction, _TANGENT_COLUMNS, np.float32)
+        columns |= _columns(self.position, _PLACE_COLUMNS, np.float64)
         return cloud.with_attributes(**columns)
 
     def label(self, points: Any) -> Cloud:
         """Return the whole input with the first columns of `to_cloud`: what is known of the edge, and ``nx ny nz``.
 
-        Where there is no edge the first two and ``edge_convex`` are 0, the others NaN.
+        Where there is no edge the first two and ``edge_convex`` are 0, the others NaN. Attributes of the input that
+        have one of these names are kept as ``input_nx`` and so on, ``input_nx_2``
+        where that is there too, as after a second run.
         """
-        return self._describe(as_cloud(points), self.index)
+        cloud = as_cloud(points)
+        return make_room(cloud, FIRST_COLUMNS).with_attributes(**self._describe(len(cloud), self.index))
 
     def plot(self, axes: Any = None, *, points: Any = None) -> Any:
         """Scatter the edge points by kind in Matplotlib `axes` (3D unless given) and return them.
@@ -206,14 +220,14 @@ class Edges:
 
         return export.as_html(self)
 
-    def _describe(self, cloud: Cloud, rows: np.ndarray) -> Cloud:
-        kind, convex = np.zeros(len(cloud), np.uint8), np.zeros(len(cloud), np.int8)
-        strength, angle = np.zeros(len(cloud), np.float32), np.full(len(cloud), np.nan, np.float32)
-        normals = np.full((len(cloud), 3), np.nan, np.float32)
+    def _describe(self, num: int, rows: np.ndarray) -> dict[str, np.ndarray]:
+        kind, convex = np.zeros(num, np.uint8), np.zeros(num, np.int8)
+        strength, angle = np.zeros(num, np.float32), np.full(num, np.nan, np.float32)
+        normals = np.full((num, 3), np.nan, np.float32)
         kind[rows], strength[rows], angle[rows], convex[rows] = self.kind, self.strength, self.angle, self.convex
         normals[rows] = self.normals[:, 0]
-        described = {"edge_kind": kind, "edge_strength": strength, "edge_angle": angle, "edge_convex": convex}
-        return cloud.with_attributes(**described, **_columns(normals, ("nx", "ny", "nz"), np.float32))
+        described = dict(zip(FIRST_COLUMNS, (kind, strength, angle, convex), strict=False))
+        return described | _columns(normals, FIRST_COLUMNS[4:], np.float32)
 
 
 def as_kinds(kinds: EdgeKind | str | Iterable[str]) -> EdgeKind:

@@ -9,7 +9,7 @@ from rich.table import Table as RichTable
 
 from edgel._cli import files
 from edgel._cli.errors import ExitCode, exit_codes, failing_as
-from edgel._cli.options import Debug
+from edgel._cli.options import Debug, NoClobber
 from edgel._cli.output import stdout_console
 from edgel._cli.progress import Watch
 
@@ -39,14 +39,16 @@ def demo(
         int | None,
         typer.Option(help="Points of each scan. [dim]\\[default: as many as in the paper][/dim]", show_default=False),
     ] = None,
+    no_clobber: NoClobber = False,
     debug: Debug = False,
 ) -> None:
     """Repeat the published experiment."""
     with exit_codes(debug=debug):
-        files.check_new_folder(directory)
         with Watch() as watch:
             watch("starting")
-            from edgel._demo import run_demo  # not at the top: Matplotlib takes time to import
+            from edgel._demo import file_names, run_demo  # not at the top: Matplotlib takes time to import
+
+            files.check_new_folder(directory, file_names(), inputs=(), no_clobber=no_clobber)
 
             with failing_as(ExitCode.OUTPUT, directory, ["num_points"]):
                 done = run_demo(directory, num_points=num_points, progress=watch)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -11,13 +11,15 @@ import typer
 
 import edgel
 from edgel._cli import files, options
+from edgel._cli.compare import check_kept
 from edgel._cli.errors import ExitCode, Failure, exit_codes, failing_as
 from edgel._cli.methods import check_options, find_edges
-from edgel._cli.output import print_json, print_line, print_table
+from edgel._cli.output import print_json, print_line, print_table, renamed
 from edgel._cli.progress import Watch
 from edgel._cli.summary import collect, summary
+from edgel._columns import set_aside
 from edgel._stages import Stages
-from edgel.edges import Edges
+from edgel.edges import ALL_COLUMNS, FIRST_COLUMNS, Edges
 
 HELP = """Find the edge points of a cloud, their kind, and their normals.
 
@@ -25,8 +27,8 @@ The edge points are written with all attributes of the input and [bold]edge_kind
 4 occluded, 8 crease, 16 color, 32 image), [bold]edge_strength[/bold] (0 to 1), [bold]edge_angle[/bold] between the two
 faces (radians), [bold]edge_convex[/bold] (1 convex, -1 concave, 0 unknown), the faces' normals [bold]nx ny nz nx2 ny2
 nz2[/bold], the edge's tangent [bold]tx ty tz[/bold] and refined place [bold]edge_x edge_y edge_z[/bold]; what is not
-known is NaN. --all leaves out the second normal, the tangent and the place. Lengths are in the cloud's unit. Without
--o only the summary is shown.
+known is NaN. The input's own columns of these names are kept as input_nx and so on. --all leaves out the second normal,
+the tangent and the place. Lengths are in the cloud's unit. Without -o only the summary is shown.
 
 \b
 Examples:
@@ -101,6 +103,7 @@ def detect(
     ] = None,
     gray_min: Annotated[float | None, options.paper_option("gray_min", "Grey of the lowest point, 0 to 255.")] = None,
     as_json: options.AsJson = False,
+    no_clobber: options.NoClobber = False,
     debug: options.Debug = False,
 ) -> None:
     """Find the edge points of a cloud."""
@@ -122,7 +125,9 @@ def detect(
     page = None
     with exit_codes(as_json=as_json, debug=debug):
         given = check_options(method, given)
-        check_outputs(output, report, label_all=label_all, as_json=as_json)
+        in_place = check_outputs(
+            output, report, source, intrinsics, label_all=label_all, as_json=as_json, no_clobber=no_clobber
+        )
         if method == options.PAPER and min_angle is not None:
             raise Failure(ExitCode.USAGE, "--min-angle: the published method tells no creases apart; leave it out")
         if crop is not None and not all(low <= high for low, high in zip(crop[:3], crop[3:], strict=True)):
@@ -134,25 +139,23 @@ def detect(
             edges = choose(cloud, edges, min_angle, crop)
             if output is not None:
                 with stages("writing"):
-                    files.write_cloud(output, edges.label(cloud) if label_all else edges.to_cloud(cloud))
+                    written = edges.label(cloud) if label_all else edges.to_cloud(cloud)
+                    if in_place:
+                        check_kept(output, cloud, written)
+                    files.write_cloud(output, written, no_clobber=no_clobber)
             if report is not None:
                 with stages("report"):
                     page = report_on(source, output, cloud, edges, report)
+        aside = {} if output is None else set_aside(cloud.attributes, FIRST_COLUMNS if label_all else ALL_COLUMNS)
         if as_json:
-            print_json(collect(source, output, page, edges, stages.seconds))
+            print_json(collect(source, output, page, edges, stages.seconds, aside))
             return
         print_table(f"Edges of {source}", summary(edges, stages.seconds))
         if edges.share > _SUSPICIOUS_SHARE:
             print_line(
                 "more than half of the points are edges: the cloud may be too sparse for this method", style="yellow"
             )
-        if output is not None:
-            what = "the whole cloud, labelled" if label_all else "the edge points"
-            print_line(f"{'stdout' if output == files.PIPE else output}: {what}")
-        if page is not None:
-            print_line(f"{page}: the report")
-        if output is None and report is None:
-            print_line("nothing was written; add -o edges.ply to write the edge points", style="dim")
+        tell_written(output, page, aside, label_all=label_all)
 
 
 def choose(cloud: edgel.Cloud, edges: Edges, min_angle: float | None, crop: Sequence[float] | None) -> Edges:
@@ -162,23 +165,58 @@ def choose(cloud: edgel.Cloud, edges: Edges, min_angle: float | None, crop: Sequ
     return edges if crop is None else edges.crop(cloud, [crop[:3], crop[3:]])
 
 
-def check_outputs(output: str | None, report: str | None, *, label_all: bool, as_json: bool) -> None:
-    """Raise a `Failure` for outputs that contradict each other or cannot be written."""
+def tell_written(output: str | None, page: Path | None, aside: Mapping[str, str], *, label_all: bool) -> None:
+    """Say what was written, and which columns of the input have other names there."""
+    if aside:
+        print_line(renamed(aside))
+    if output is not None:
+        what = "the whole cloud, labelled" if label_all else "the edge points"
+        print_line(f"{'stdout' if output == files.PIPE else output}: {what}")
+    if page is not None:
+        print_line(f"{page}: the report")
+    if output is None and page is None:
+        print_line("nothing was written; add -o edges.ply to write the edge points", style="dim")
+
+
+def check_outputs(
+    output: str | None,
+    report: str | None,
+    source: str,
+    intrinsics: str | None,
+    *,
+    label_all: bool,
+    as_json: bool,
+    no_clobber: bool,
+) -> bool:
+    """Return whether the input itself is replaced, or raise a `Failure` for outputs that must not or cannot be written.
+
+    They may contradict each other, hold less than the input that they replace, or lie where nothing can be written.
+    """
     if label_all and output is None:
         raise Failure(ExitCode.USAGE, "--all: says what -o writes; add -o OUT")
     if as_json and output == files.PIPE:
         raise Failure(ExitCode.USAGE, "--json: stdout carries the cloud already; name a file with -o")
-    if output is not None:
-        files.check_output(output)
     if report is not None:
-        files.check_new_folder(report)
+        from edgel._report import file_names  # not at the top: Matplotlib takes time to import
+
+        names = file_names([name_of(source)])
+        files.check_new_folder(report, names, inputs=[source, intrinsics], no_clobber=no_clobber)
+    if output is None:
+        return False
+    files.check_output(output, no_clobber=no_clobber)
+    return files.check_in_place(output, source, intrinsics, whole=label_all)
+
+
+def name_of(source: str) -> str:
+    """Return what a report calls an input."""
+    return "stdin" if source == files.PIPE else Path(source).stem
 
 
 def report_on(source: str, output: str | None, cloud: edgel.Cloud, edges: Edges, directory: str) -> Path:
     """Write the report of one cloud, compared with what the other detector finds in it, and return its page."""
     from edgel._report import Case, write_report  # not at the top: Matplotlib takes time to import
 
-    name = "stdin" if source == files.PIPE else Path(source).stem
+    name = name_of(source)
     find_other = edgel.detect if edges.method == options.PAPER else edgel.paper.detect
     try:
         other = find_other(cloud)

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import os
+import stat
 import sys
 import tempfile
+from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 from edgel._cli.errors import ExitCode, Failure, failing_as
 from edgel.cloud import Cloud
 
 if TYPE_CHECKING:
+    import re
     from collections.abc import Iterable
 
 PIPE = "-"
@@ -42,7 +45,7 @@ def read_cloud(path: str, intrinsics: str | None = None) -> Cloud:
         return io.read(sys.stdin.buffer) if path == PIPE else io.read(path, intrinsics=intrinsics)
 
 
-def check_output(path: str) -> None:
+def check_output(path: str, *, no_clobber: bool = False) -> None:
     """Raise a `Failure` for an output that could not be written, before the long work rather than after it."""
     from edgel.io import WRITERS
 
@@ -55,7 +58,62 @@ def check_output(path: str) -> None:
     if os.path.isdir(path):
         raise Failure(ExitCode.USAGE, f"{path}: is a folder; name the file, as in {os.path.join(path, 'edges.ply')}")
     check_extension(path, WRITERS)
-    check_folder(path, Path(path).parent)
+    check_file(path, no_clobber=no_clobber)
+
+
+def check_file(path: str, *, no_clobber: bool) -> None:
+    """Raise a `Failure` for a file that cannot, or with --no-clobber must not, be replaced or made."""
+    from edgel.io.files import check_replaceable
+
+    check_clobber(path, no_clobber=no_clobber)
+    with failing_as(ExitCode.OUTPUT, path):
+        old = check_replaceable(path)
+    if old is None or stat.S_ISREG(old.st_mode):  # nothing is made beside a pipe or a device
+        check_folder(path, Path(os.path.realpath(path)).parent if os.path.islink(path) else Path(path).parent)
+
+
+def check_clobber(path: str | os.PathLike[str], *, no_clobber: bool) -> None:
+    """Raise a `Failure` for a file that is there already, with --no-clobber."""
+    if no_clobber and os.path.isfile(path):
+        raise Failure(ExitCode.OUTPUT, f"{path}: is there already; name another file, or leave out --no-clobber")
+
+
+def is_same_file(output: str, source: str) -> bool:
+    """Whether an output is the input itself: by whatever name, by links, or by the shell's > and <."""
+    out, given = _status(output, sys.stdout), _status(source, sys.stdin)
+    return out is not None and given is not None and stat.S_ISREG(out.st_mode) and os.path.samestat(out, given)
+
+
+def _status(path: str, pipe: TextIO) -> os.stat_result | None:
+    with suppress(OSError, ValueError):
+        return os.fstat(pipe.fileno()) if path == PIPE else os.stat(path)
+    return None
+
+
+def check_not_input(output: str, inputs: Iterable[str | None], remedy: str = "name another file") -> None:
+    """Raise a `Failure` for an output that is an input, whose content it would replace by something else."""
+    for source in inputs:
+        if source is not None and is_same_file(output, source):
+            same = "is the input itself" if output == source else f"is the input {source} itself"
+            raise Failure(ExitCode.USAGE, f"{'stdout' if output == PIPE else output}: {same}; {remedy}")
+
+
+def check_in_place(output: str, source: str, intrinsics: str | None, *, whole: bool = True) -> bool:
+    """Return whether an output is the input itself, or raise a `Failure` where it would hold less than that.
+
+    Parameters
+    ----------
+    whole : bool
+        Whether every point will be written, as `edgel._cli.compare.check_kept` demands then.
+    """
+    check_not_input(output, [intrinsics])
+    formats = [".ply" if path == PIPE else Path(path).suffix.lower() for path in (output, source)]
+    if not whole:
+        remedy = "the edge points alone would replace it: name another file, or add --all, which keeps every point"
+        check_not_input(output, [source], remedy)
+    elif output == PIPE or intrinsics is not None or formats[0] != formats[1]:
+        check_not_input(output, [source])
+    return is_same_file(output, source)
 
 
 def check_extension(path: str, known: Iterable[str]) -> None:
@@ -84,16 +142,29 @@ def check_folder(path: str, folder: Path) -> None:
         raise Failure(ExitCode.OUTPUT, f"{path}: {folder} {what}") from error
 
 
-def check_new_folder(path: str) -> None:
-    """Raise a `Failure` for a folder that is not there and cannot be made, or cannot be written."""
-    folder = Path(path)
+def check_new_folder(path: str, files: re.Pattern[str], *, inputs: Iterable[str | None], no_clobber: bool) -> None:
+    """Raise a `Failure` for a folder that cannot be made or written, or where a file must not be replaced.
+
+    Parameters
+    ----------
+    files : pattern
+        The names that will be written in it.
+    inputs : iterable of str or None
+        What the command reads.
+    """
+    folder, inputs = Path(path), list(inputs)
     check_folder(path, next(parent for parent in (folder, *folder.parents) if parent.exists()))
+    for file in sorted(folder.glob("*")):
+        if files.fullmatch(file.name):
+            check_not_input(str(file), inputs, "name another folder")
+            check_file(str(file), no_clobber=no_clobber)
 
 
-def write_cloud(path: str, cloud: Cloud) -> None:
+def write_cloud(path: str, cloud: Cloud, *, no_clobber: bool = False) -> None:
     """Write a cloud, PLY to stdout when the path is ``-``."""
     from edgel import io
 
+    check_clobber(path, no_clobber=no_clobber)  # once more: the work took its time
     if path != PIPE:
         with failing_as(ExitCode.OUTPUT, path):
             io.write(path, cloud)

@@ -9,15 +9,18 @@ import typer
 
 import edgel
 from edgel._cli import files, options
+from edgel._cli.compare import check_kept
 from edgel._cli.errors import ExitCode, exit_codes, failing_as
-from edgel._cli.output import count, print_line, print_table, seconds
+from edgel._cli.output import count, print_line, print_table, renamed, seconds
 from edgel._cli.progress import Watch
+from edgel._columns import make_room, set_aside
 from edgel._stages import Stages
 
 HELP = """Estimate the normal of every point of a cloud.
 
 The whole cloud is written with [bold]nx ny nz[/bold], unit normals, NaN where the neighbours span no plane, and
-[bold]variation[/bold], the surface variation (0 on a plane, 1/3 at most: large at edges and in noise).
+[bold]variation[/bold], the surface variation (0 on a plane, 1/3 at most: large at edges and in noise). The input's own
+columns of these names are kept as input_nx and so on.
 
 \b
 Examples:
@@ -25,6 +28,8 @@ Examples:
   edgel normals scan.las -o normals.laz --num-neighbors 24 --viewpoint 637000 849000 2000
   cat scan.ply | edgel normals - -o - > normals.ply
 """
+
+_COLUMNS = ("nx", "ny", "nz", "variation")
 
 
 def normals(
@@ -38,12 +43,14 @@ def normals(
     ] = None,
     viewpoint: options.Viewpoint = None,
     intrinsics: options.Intrinsics = None,
+    no_clobber: options.NoClobber = False,
     debug: options.Debug = False,
 ) -> None:
     """Estimate the normal of every point of a cloud."""
     given = options.given(num_neighbors=num_neighbors, viewpoint=viewpoint)
     with exit_codes(debug=debug):
-        files.check_output(output)
+        files.check_output(output, no_clobber=no_clobber)
+        in_place = files.check_in_place(output, source, intrinsics)
         files.check_input(source, intrinsics)
         with Watch() as watch:
             stages = Stages(watch)
@@ -52,9 +59,11 @@ def normals(
             with stages("normals"), failing_as(ExitCode.DATA, source, given):
                 planes = edgel.estimate_normals(cloud, **given)
             with stages("writing"):
-                nx, ny, nz = planes.normals.astype(np.float32).T
-                variation = planes.variation.astype(np.float32)
-                files.write_cloud(output, cloud.with_attributes(nx=nx, ny=ny, nz=nz, variation=variation))
+                values = (*planes.normals.astype(np.float32).T, planes.variation.astype(np.float32))
+                written = make_room(cloud, _COLUMNS).with_attributes(**dict(zip(_COLUMNS, values, strict=True)))
+                if in_place:
+                    check_kept(output, cloud, written)
+                files.write_cloud(output, written, no_clobber=no_clobber)
         rows: list[tuple[str, ...]] = [("points", count(len(cloud)))]
         not_finite = int(np.isnan(cloud.xyz.sum(axis=1) * 0).sum())
         if not_finite:
@@ -64,4 +73,6 @@ def normals(
         rows.append(("time", seconds(sum(stages.seconds.values()))))
         rows += [(f"  {name}", seconds(duration)) for name, duration in stages.seconds.items()]
         print_table(f"Normals of {source}", rows)
+        if aside := set_aside(cloud.attributes, _COLUMNS):
+            print_line(renamed(aside))
         print_line(f"{'stdout' if output == files.PIPE else output}: the whole cloud with nx, ny, nz and variation")

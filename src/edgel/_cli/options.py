@@ -31,6 +31,7 @@ Viewpoint = Annotated[
     ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object on stdout.")]
+NoClobber = Annotated[bool, typer.Option("--no-clobber", help="Replace no file that is there already.")]
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
 
 

@@ -61,6 +61,17 @@ def count(number: int) -> str:
     return f"{number:,}"
 
 
+def renamed(names: Mapping[str, str]) -> str:
+    """Say under which names the input's own columns are kept.
+
+    Examples
+    --------
+    >>> renamed({"nx": "input_nx", "ny": "input_ny"})
+    "the input's own nx, ny: kept as input_nx, input_ny"
+    """
+    return f"the input's own {', '.join(names)}: kept as {', '.join(names.values())}"
+
+
 def seconds(duration: float) -> str:
     """Write a time.
 

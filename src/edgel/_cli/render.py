@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -63,6 +62,7 @@ def render(
     ),
     viewpoint: options.Viewpoint = None,
     intrinsics: options.Intrinsics = None,
+    no_clobber: options.NoClobber = False,
     debug: options.Debug = False,
 ) -> None:
     """Draw a cloud and its edges."""
@@ -75,7 +75,8 @@ def render(
         if min_strength is not None and "min_strength" in arguments(method):
             given["min_strength"] = min_strength
         files.check_extension(output, [".png"])
-        files.check_folder(output, Path(output).parent)
+        files.check_file(output, no_clobber=no_clobber)
+        files.check_not_input(output, [source, intrinsics])
         files.check_input(source, intrinsics)
         with Watch() as watch:
             stages = Stages(watch)
@@ -85,6 +86,7 @@ def render(
             with stages("drawing"), failing_as(ExitCode.DATA, source, look):
                 drawn = picture(cloud, edges, **look)
             with stages("writing"), failing_as(ExitCode.OUTPUT, output):
+                files.check_clobber(output, no_clobber=no_clobber)
                 save(output, drawn)
         rows = [("points", count(edges.num_points)), ("edge points", count(len(edges)), f"{edges.share:.1%}")]
         rows += [(f"  {name}", count(number)) for name, number in edges.count_kinds().items()]

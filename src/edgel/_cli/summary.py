@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -30,13 +31,19 @@ def crease_remark(edges: Edges) -> str:
 
 
 def collect(
-    source: str, output: str | None, page: Path | None, edges: Edges, by_stage: dict[str, float]
+    source: str,
+    output: str | None,
+    page: Path | None,
+    edges: Edges,
+    by_stage: dict[str, float],
+    renamed: Mapping[str, str],
 ) -> dict[str, Any]:
     """Return what ``--json`` prints."""
     return {
         "input": source,
         "output": output,
         "report": None if page is None else str(page),
+        "renamed": dict(renamed),
         "method": edges.method,
         "reason": edges.reason,
         "points": edges.num_points,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,9 +25,10 @@ from edgel._demo.tables import (
 from edgel._demo.truth import found_lengths, offsets
 from edgel._detect import detect
 from edgel._report import Case, Table, make_directory, write_report
+from edgel._report import file_names as report_names
 from edgel.io import write
 
-__all__ = ["Demo", "Measurement", "Times", "run_demo", "side_by_side"]
+__all__ = ["Demo", "Measurement", "Times", "file_names", "run_demo", "side_by_side"]
 
 _DRAWN = (
     0.5  # mm between the points of a part in the report's first figure: evenly apart, or the far side shows through
@@ -132,6 +134,13 @@ def run_demo(
     page = write_report(cases, folder, title="Edges of a tee and an elbow", findings=said, tables=tables)
     figures = [folder / f"{one.name}-figure-{number}.png" for one in measurements for number in (1, 3, 4, 5, 8, 9)]
     return Demo(measurements, tables, said, page, (page, folder / "edges.png", *figures, *files))
+
+
+def file_names() -> re.Pattern[str]:
+    """Match the names of the files that the demo writes into its folder."""
+    parts = list(PUBLISHED)
+    clouds = rf"(?:{'|'.join(parts)})(?:-edges)?\.ply"
+    return re.compile(rf"{clouds}|edges\.png|{report_names(parts).pattern}", re.IGNORECASE)
 
 
 def side_by_side(measurements: Sequence[Measurement], *, width: int = 1600) -> np.ndarray:

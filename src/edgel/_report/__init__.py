@@ -16,7 +16,7 @@ from edgel.cloud import Cloud
 from edgel.edges import Edges
 from edgel.io.files import replacing
 
-__all__ = ["Case", "Table", "make_directory", "write_report"]
+__all__ = ["Case", "Table", "file_names", "make_directory", "write_report"]
 
 PAGE = "report.html"
 
@@ -101,6 +101,13 @@ def write_report(
     with replacing(folder / PAGE) as file:
         file.write(page(title, parts).encode())
     return folder / PAGE
+
+
+def file_names(names: Sequence[str]) -> re.Pattern[str]:
+    """Match the names of the files that a report of cases with these names may write into its folder."""
+    taken: set[str] = set()
+    stems = "|".join(re.escape(_file_stem(name, taken)) for name in names)
+    return re.compile(rf"{re.escape(PAGE)}|(?:{stems})-figure-\d+\.png", re.IGNORECASE)
 
 
 def _tables(case: Case) -> list[Table]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping
 
@@ -43,13 +44,19 @@ def flat_attributes(cloud: Cloud, path: object, *, keep_arrays: bool = False) ->
         word = re.sub(r"\s+", "_", name.strip()) or "_"
         parts = {word: values}
         if values.ndim > 1:
-            table = values.reshape(len(values), -1)
-            parts = {word: table} if keep_arrays else {f"{word}_{i}": table[:, i] for i in range(table.shape[1])}
+            table = as_table(values)
+            whole = keep_arrays and table.shape[1]  # no column at all has nowhere to go
+            parts = {word: table} if whole else {f"{word}_{i}": table[:, i] for i in range(table.shape[1])}
         for part, column in parts.items():
             if part in columns or part.lower() in ("x", "y", "z"):
                 raise FormatError(f"{path}: two columns would be called {part!r}; rename attribute {name!r}")
             columns[part] = column
     return columns
+
+
+def as_table(values: np.ndarray) -> np.ndarray:
+    """Return an attribute (N, ...) as (N, C), of no points too."""
+    return values.reshape(len(values), math.prod(values.shape[1:]))
 
 
 def find_xyz(names: Iterable[str]) -> list[str] | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import Any
 
@@ -68,7 +68,7 @@ def read(path: str | os.PathLike[str]) -> Cloud:
         raise FormatError(f"{name}: declared {declared} bytes, found {size}; the file is cut off: get it again")
     lib = library(name)
     try:
-        scans = _read_scans(name, lib, size)
+        scans, num_images = _read_scans(name, lib, size)
     except FormatError:
         raise
     except Exception as error:  # libe57 has its own base of errors, and its bindings raise others
@@ -76,17 +76,21 @@ def read(path: str | os.PathLike[str]) -> Cloud:
         raise FormatError(
             f"{name}: the E57 file is damaged ({reason[0] if reason else 'unknown'}); get it again"
         ) from None
-    return _merge(scans)
+    cloud = _merge(scans)
+    if num_images:
+        cloud = replace(cloud, metadata={**cloud.metadata, "left_out": (f"{num_images} images",)})
+    return cloud
 
 
-def _read_scans(path: str, lib: ModuleType, size: int) -> list[_Scan]:
+def _read_scans(path: str, lib: ModuleType, size: int) -> tuple[list[_Scan], int]:
     image = lib.ImageFile(path, "r")
     try:
         root = image.root()
         if not root.isDefined("data3D"):
-            return []
+            return [], 0
         data = root["data3D"]
-        return [_read_scan(path, lib, image, data[i], size) for i in range(len(data))]
+        num_images = len(root["images2D"]) if root.isDefined("images2D") else 0
+        return [_read_scan(path, lib, image, data[i], size) for i in range(len(data))], num_images
     finally:
         image.close()
 

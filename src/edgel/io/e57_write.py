@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import os
 import re
+import signal
+import threading
 import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import ModuleType
 from typing import Any
 
@@ -49,7 +53,7 @@ def write(path: str | os.PathLike[str], cloud: Cloud) -> None:
     Raises
     ------
     FormatError
-        If an attribute cannot be stored, or pye57 is not installed.
+        If an attribute cannot be stored, `path` is a pipe or a device, or pye57 is not installed.
     OSError
         If the file cannot be written.
 
@@ -62,18 +66,42 @@ def write(path: str | os.PathLike[str], cloud: Cloud) -> None:
     array([0., 0., 5.])
     """
     lib = library(path)
-    if not len(cloud):
-        raise FormatError(f"{os.fspath(path)}: E57 cannot hold a scan without points; write .ply or .npz instead")
     columns = _fields(path, cloud)
     with replacing(path) as file:
+        if not isinstance(file.name, str):
+            raise FormatError(
+                f"{os.fspath(path)}: E57 goes into no pipe or device; write a file, or .ply into the pipe"
+            )
         try:
-            image = lib.ImageFile(file.name, "w")
+            with _uninterrupted():
+                image = lib.ImageFile(file.name, "w")
+                try:
+                    _write_scan(lib, image, columns, cloud.viewpoint)
+                finally:
+                    image.close()
         except lib.E57Exception as error:
-            raise OSError(f"{os.fspath(path)}: cannot be written ({error})") from None
-        try:
-            _write_scan(lib, image, columns, cloud.viewpoint)
-        finally:
-            image.close()
+            reason = str(error).strip().splitlines()[0]
+            raise OSError(f"{os.fspath(path)}: cannot be written ({reason}); is the disk full?") from None
+
+
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Hold Ctrl-C back to the end: an interrupt between two calls of libe57 leaves objects that crash it."""
+    if threading.current_thread() is not threading.main_thread():  # no other thread is ever interrupted
+        yield
+        return
+    held: list[Any] = []
+    usual = signal.getsignal(signal.SIGINT)
+    if not callable(usual):  # ignored, or left to the system
+        yield
+        return
+    signal.signal(signal.SIGINT, lambda *arguments: held.append(arguments))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)
+        if held:
+            usual(*held[0])
 
 
 def _fields(path: object, cloud: Cloud) -> dict[str, np.ndarray]:
@@ -92,7 +120,7 @@ def _fields(path: object, cloud: Cloud) -> dict[str, np.ndarray]:
         field = standard.get(name, f"{PREFIX}:" + re.sub(r"[^\w.-]", "_", name))
         if not re.fullmatch(rf"({PREFIX}:)?[A-Za-z_][A-Za-z0-9_.-]*", field) or field in columns:
             raise FormatError(f"{path}: attribute {name!r} has a name that E57 cannot hold or has twice; rename it")
-        if values.dtype.kind == "u" and values.dtype.itemsize == 8 and int(values.max()) > np.iinfo(np.int64).max:
+        if values.dtype.kind == "u" and values.dtype.itemsize == 8 and values.max(initial=0) > np.iinfo(np.int64).max:
             raise FormatError(
                 f"{path}: attribute {name!r} exceeds 64-bit signed integers, E57's widest; write .npz instead"
             )
@@ -127,8 +155,10 @@ def _write_scan(lib: ModuleType, image: Any, columns: dict[str, np.ndarray], vie
     scan.set("points", points)
     scans.append(scan)
     writer = points.writer(buffers)
-    writer.write(count)
-    writer.close()
+    try:
+        writer.write(count)
+    finally:
+        writer.close()  # before the image is: libe57 crashes over a writer that outlives it
 
 
 def _pose_node(lib: ModuleType, image: Any, viewpoint: np.ndarray) -> Any:
@@ -150,7 +180,7 @@ def _field_node(lib: ModuleType, image: Any, values: np.ndarray) -> tuple[Any, n
         return lib.FloatNode(image, 0.0, precision), array
     # long long, since pye57 takes NumPy's int64 (a C long) for 32 bits.
     array = np.ascontiguousarray(values, np.longlong)
-    low, high = int(array.min()), int(array.max())
+    low, high = (int(array.min()), int(array.max())) if len(array) else (0, 0)
     if values.dtype.kind in "iu" and values.dtype.itemsize < 8:
         # The type's own bounds, so that it comes back as the same type.
         low, high = int(np.iinfo(values.dtype).min), int(np.iinfo(values.dtype).max)

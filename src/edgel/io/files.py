@@ -5,13 +5,20 @@ from __future__ import annotations
 import os
 import re
 import secrets
+import shutil
 import stat
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO, NoReturn
 
 from edgel.io.errors import FormatError
+
+try:
+    import fcntl
+except ImportError:  # Windows, where an open file cannot be removed or replaced anyway
+    fcntl = None
 
 # What the first bytes of a file give away: pattern, what it is, what to do with it.
 _MAGIC: list[tuple[bytes, str, str]] = [
@@ -38,6 +45,8 @@ _MAGIC: list[tuple[bytes, str, str]] = [
 _NUMBERS = re.compile(
     rb"\s*[-+]?(\d|\.\d|nan)[-+.\deEnaif]*([\s,;]+[-+]?(\d|\.\d|nan)[-+.\deEnaif]*){2,}", re.IGNORECASE
 )
+# How the names of temporary files begin; the process and a random word follow.
+_TEMPORARY = ".edgel-"
 
 
 def describe(head: bytes) -> tuple[str, str]:
@@ -99,37 +108,122 @@ def check_readable(path: str | os.PathLike[str]) -> None:
 def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     """Write a temporary file in the same folder and put it in place of `path` when all went well.
 
-    The old file stays whole until the new one is complete, so a cloud may be written over the file it came from.
+    Whatever ends the program, and when: there is the old file or the whole new one. A replaced file's mode and owner
+    stay. What a killed process left in the folder is cleared. A pipe or a device is never replaced: it gets the content
+    once that is complete.
 
     Yields
     ------
     file : binary file
-        Open for writing; ``file.name`` is its path, for libraries that open files themselves.
+        Open for writing; ``file.name`` is its path, for libraries that open files themselves, and a number where the
+        content goes into a pipe or a device.
 
     Raises
     ------
     OSError
-        If the folder is missing or not writable; nothing is left behind.
+        If the file must not be replaced, or the folder is missing or not writable; nothing is left behind.
     """
+    old = check_replaceable(path)
+    if old is not None and not stat.S_ISREG(old.st_mode):
+        with tempfile.TemporaryFile() as file:
+            yield file
+            file.seek(0)
+            with open(path, "wb", buffering=0) as stream:
+                shutil.copyfileobj(file, stream)
+        return
     # A link is followed: its target is replaced, the link stays.
     target = Path(os.path.realpath(path))
-    if target.is_dir():
+    _clear_stale(target.parent)
+    with _temporary(path, target.parent, old) as file:
+        yield file
+        file.flush()
+        os.fsync(file.fileno())  # the content is on the disk before the name is: a power cut leaves no empty file
+        if fcntl is None:
+            file.close()  # Windows moves no open file
+        try:
+            os.replace(file.name, target)
+        except OSError as error:
+            raise type(error)(f"{os.fspath(path)}: cannot be replaced ({error.strerror}); name another file") from error
+        _sync_folder(target.parent)
+
+
+def check_replaceable(path: str | os.PathLike[str]) -> os.stat_result | None:
+    """Return the status of the file that `path` would replace, None where there is none.
+
+    Raises
+    ------
+    IsADirectoryError, PermissionError
+        If it is a folder, a disk, or protected from writing, which renaming another file over it would not notice.
+    """
+    try:
+        status = os.stat(path)
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    if stat.S_ISDIR(status.st_mode):
         raise IsADirectoryError(f"{os.fspath(path)}: is a folder; name the file to write")
-    if target.exists() and not target.is_file():  # a device or a pipe cannot be replaced
-        with open(target, "wb") as file:
-            yield file
-        return
-    temporary = target.parent / f".edgel-{secrets.token_hex(8)}.tmp"
+    if stat.S_ISBLK(status.st_mode):
+        raise PermissionError(f"{os.fspath(path)}: is a disk, not a file; name the file to write")
+    if not os.access(path, os.W_OK):
+        raise PermissionError(f"{os.fspath(path)}: is protected from writing; name another file, or chmod it")
+    return status
+
+
+@contextmanager
+def _temporary(path: str | os.PathLike[str], folder: Path, old: os.stat_result | None) -> Iterator[BinaryIO]:
+    """Create a locked file with the mode and owner of an old one, and remove what is left of it at the end."""
+    name = folder / f"{_TEMPORARY}{os.getpid()}-{secrets.token_hex(8)}.tmp"
+    mode = 0o666 if old is None else stat.S_IMODE(old.st_mode)
     try:
-        file = open(temporary, "xb")  # noqa: SIM115 - closed below, before the file is moved
-    except OSError as error:
-        reason = "the folder does not exist" if isinstance(error, FileNotFoundError) else error.strerror
-        raise type(error)(f"{os.fspath(path)}: cannot be written ({reason}); choose another folder") from error
-    try:
+        try:
+            file = _create(name, mode)
+        except OSError as error:
+            reason = "the folder does not exist" if isinstance(error, FileNotFoundError) else error.strerror
+            raise type(error)(f"{os.fspath(path)}: cannot be written ({reason}); choose another folder") from error
         with file:
+            if old is not None and hasattr(os, "fchown"):
+                with suppress(PermissionError):  # only root gives files away
+                    os.fchown(file.fileno(), old.st_uid, old.st_gid)
+                os.fchmod(file.fileno(), mode)  # after the owner, whose change takes bits away; umask does not count
             yield file
-        os.replace(temporary, target)
-    except BaseException:
-        with suppress(FileNotFoundError):
-            temporary.unlink()
-        raise
+    finally:
+        with suppress(OSError):
+            name.unlink()
+
+
+def _create(name: Path, mode: int) -> BinaryIO:
+    while True:
+        # Never wider than the old file's mode, not even for a moment.
+        file = open(name, "xb", opener=lambda path, flags: os.open(path, flags, mode))  # noqa: SIM115
+        if fcntl is None:
+            return file
+        with suppress(OSError):  # some network folders have no locks: nobody clears them then
+            fcntl.flock(file, fcntl.LOCK_EX)
+        if os.fstat(file.fileno()).st_nlink:
+            return file
+        file.close()  # another process took it for stale before it was locked
+
+
+def _clear_stale(folder: Path) -> None:
+    """Remove the temporary files of processes that were killed: nobody holds their lock any more."""
+    if fcntl is None:
+        return
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            if not (entry.name.startswith(_TEMPORARY) and entry.name.endswith(".tmp")):
+                continue
+            with suppress(OSError):  # locked, or not ours to remove
+                if not entry.is_file(follow_symlinks=False):
+                    continue
+                with open(entry.path, "r+b") as file:
+                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    os.unlink(entry.path)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Put a new name on the disk, where the system can."""
+    with suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)

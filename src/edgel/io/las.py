@@ -96,7 +96,10 @@ def read(path: str | os.PathLike[str]) -> Cloud:
             raise FormatError(
                 f"{name}: scales {scales} make coordinates infinite; the header is damaged: get the file again"
             )
-    return Cloud(xyz, columns, crs=crs_of(header), metadata={"las_header": header})
+    metadata: dict[str, object] = {"las_header": header}
+    if header.number_of_evlrs:
+        metadata["left_out"] = (f"{header.number_of_evlrs} extended records (EVLR)",)
+    return Cloud(xyz, columns, crs=crs_of(header), metadata=metadata)
 
 
 def _check_records(path: str, head: bytes, size: int) -> None:

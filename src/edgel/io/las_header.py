@@ -51,12 +51,22 @@ def _declare_as_given(header: laspy.LasHeader, extra: laspy.DimensionInfo, attri
     if values is None or extra.dtype is None:
         return
     scaled = extra.scales is not None or extra.offsets is not None
-    if values.shape[1:] == extra.dtype.shape and (scaled or values.dtype == extra.dtype.base):
+    as_given = _on_grid(values, extra) if scaled else values.dtype == extra.dtype.base
+    if values.shape[1:] == extra.dtype.shape and as_given:
         attributes[extra.name] = attributes.pop(word)
         kind = extra.type_str() or extra.dtype
         header.add_extra_dim(
             laspy.ExtraBytesParams(extra.name, kind, extra.description, extra.offsets, extra.scales, extra.no_data)
         )
+
+
+def _on_grid(values: np.ndarray, extra: laspy.DimensionInfo) -> bool:
+    """Whether values are those that a scaled dimension can hold; others may have come under its name since."""
+    scales = 1.0 if extra.scales is None else extra.scales
+    offsets = 0.0 if extra.offsets is None else extra.offsets
+    with np.errstate(invalid="ignore", over="ignore"):
+        steps = (values - offsets) / scales
+        return bool((np.abs(steps - np.rint(steps)) <= 1e-6 * np.maximum(np.abs(steps), 1)).all())
 
 
 def fit_dimensions(path: str, header: laspy.LasHeader, attributes: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

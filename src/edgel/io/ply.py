@@ -31,8 +31,8 @@ def read(path: str | os.PathLike[str] | BinaryIO) -> Cloud:
     -------
     Cloud
         All scalar vertex properties as (N,) attributes of their own type; list properties, faces and other elements are
-        left out. ``obj_info num_cols`` and ``num_rows`` make the cloud organized; where Stanford's ``range_grid`` lists
-        only the valid points, the other cells are NaN.
+        left out, and named in ``metadata["left_out"]``. ``obj_info num_cols`` and ``num_rows`` make the cloud
+        organized; where Stanford's ``range_grid`` lists only the valid points, the other cells are NaN.
 
     Raises
     ------
@@ -159,7 +159,18 @@ def _to_cloud(path: str, header: Header, xyz: np.ndarray, attributes: dict[str, 
             raise FormatError(f"{path}: obj_info viewpoint {' '.join(words)!r}; three finite numbers are needed")
         viewpoint = np.array(words, np.float64)
     metadata = {"ply_comments": tuple(header.comments)} if header.comments else {}
+    if left_out := _left_out(header):
+        metadata["left_out"] = left_out
     return Cloud(xyz, attributes, shape, viewpoint, header.info.get("crs") or None, metadata)
+
+
+def _left_out(header: Header) -> tuple[str, ...]:
+    """Name what the file holds beside its points."""
+    grid = range_grid(header)
+    used = (header.index("vertex"), None if grid is None else grid[0])
+    others = [e for i, e in enumerate(header.elements) if i not in used and e.count]
+    lists = [p.name for p in header.elements[used[0]].properties if p.length_code is not None]
+    return (*(f"{e.count:,} of element {e.name}" for e in others), *(f"list {name}" for name in lists))
 
 
 def write(path: str | os.PathLike[str] | BinaryIO, cloud: Cloud) -> None:

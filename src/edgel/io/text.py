@@ -264,7 +264,11 @@ def write(path: str | os.PathLike[str], cloud: Cloud) -> None:
     suffix = os.path.splitext(path)[1].lower()
     separator = "," if suffix == ".csv" else " "
     columns = dict(zip("xyz", cloud.xyz.T, strict=True))
-    columns.update({re.sub(r"[,;#/\"']", "_", name): values for name, values in flat_attributes(cloud, path).items()})
+    for name, values in flat_attributes(cloud, path).items():
+        word = re.sub(r"[,;#/\"']", "_", name)
+        if word in columns:
+            raise FormatError(f"{os.fspath(path)}: two columns would be called {word!r}; rename attribute {name!r}")
+        columns[word] = values
     header = separator.join(columns) + "\n"
     if suffix == ".pts":
         usual = list(columns)[3:] in ([], ["intensity"], _COLORS, ["intensity", *_COLORS])
