@@ -55,7 +55,7 @@ class Watch(event.Listener):
         event.unregister("numba:compile", self)
         if self._bar is not None:
             self._bar.stop()
-        if self._told and self.compile_seconds > 1:
+        if error is None and self._told and self.compile_seconds > 1:
             print_line(f"compiled kernels in {seconds(self.compile_seconds)}; later runs start at once", style="dim")
 
     def on_start(self, event: event.Event) -> None:

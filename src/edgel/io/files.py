@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO, NoReturn
 
-from edgel.io.errors import FormatError
+from edgel.io.errors import FormatError, printable
 
 # What the first bytes of a file give away: pattern, what it is, what to do with it.
 _MAGIC: list[tuple[bytes, str, str]] = [
@@ -88,9 +88,9 @@ def check_readable(path: str | os.PathLike[str]) -> None:
     try:
         status = os.stat(path)
     except FileNotFoundError:
-        raise FileNotFoundError(f"{os.fspath(path)}: no such file; check the name and the folder") from None
+        raise FileNotFoundError(f"{printable(path)}: no such file; check the name and the folder") from None
     if stat.S_ISDIR(status.st_mode):
-        raise IsADirectoryError(f"{os.fspath(path)}: is a folder; pass one file of it")
+        raise IsADirectoryError(f"{printable(path)}: is a folder; pass one file of it")
     if stat.S_ISREG(status.st_mode) and status.st_size == 0:
         raise FormatError(f"{os.fspath(path)}: the file is empty; write it again")
 
@@ -114,7 +114,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     # A link is followed: its target is replaced, the link stays.
     target = Path(os.path.realpath(path))
     if target.is_dir():
-        raise IsADirectoryError(f"{os.fspath(path)}: is a folder; name the file to write")
+        raise IsADirectoryError(f"{printable(path)}: is a folder; name the file to write")
     if target.exists() and not target.is_file():  # a device or a pipe cannot be replaced
         with open(target, "wb") as file:
             yield file
@@ -124,7 +124,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         file = open(temporary, "xb")  # noqa: SIM115 - closed below, before the file is moved
     except OSError as error:
         reason = "the folder does not exist" if isinstance(error, FileNotFoundError) else error.strerror
-        raise type(error)(f"{os.fspath(path)}: cannot be written ({reason}); choose another folder") from error
+        raise type(error)(f"{printable(path)}: cannot be written ({reason}); choose another folder") from error
     try:
         with file:
             yield file
