@@ -56,7 +56,9 @@ class Cloud:
         for name, values in self.attributes.items():
             array = np.asarray(values)
             if array.ndim == 0 or len(array) != len(xyz):
-                raise ValueError(f"attribute {name!r:.80} has shape {array.shape}; its first axis must be {len(xyz)} long")
+                raise ValueError(
+                    f"attribute {name!r:.80} has shape {array.shape}; its first axis must be {len(xyz)} long"
+                )
             attributes[name] = array
         viewpoint = None if self.viewpoint is None else as_vector(self.viewpoint, "viewpoint")
         object.__setattr__(self, "xyz", xyz)

@@ -15,7 +15,7 @@ _PATIENCE = 2.0  # seconds in which further signals may not disturb the clearing
 _began: float | None = None  # when the first signal came
 
 
-class Terminated(BaseException):  # noqa: N818 - as KeyboardInterrupt, it is no error
+class Terminated(BaseException):
     """The system, or the terminal that was closed, asks the program to end."""
 
 

@@ -35,7 +35,14 @@ class KernelCache(NullCache):
     ----------
     function : function
         What is compiled.
+
+    Attributes
+    ----------
+    keeps : bool
+        Of all kernels together: whether each that was compiled could be kept.
     """
+
+    keeps = True
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self._function = function
@@ -53,10 +60,12 @@ class KernelCache(NullCache):
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what was compiled, where it can be kept: it runs all the same."""
-        with contextlib.suppress(Exception):
+        try:
             if self._numba.check_cachable(data):
                 compiled = dumps(self._numba.reduce(data))
                 _write(self._path(sig, data.codegen), self._head(compiled) + compiled)
+        except Exception:
+            KernelCache.keeps = False
 
     @cached_property
     def _numba(self) -> CompileResultCacheImpl:
@@ -64,7 +73,9 @@ class KernelCache(NullCache):
 
     @cached_property
     def _stamp(self) -> bytes:
-        return _HASH("\0".join([numba.__version__, *sorted(set(_ingredients(self._function, set())))]).encode()).digest()
+        return _HASH(
+            "\0".join([numba.__version__, *sorted(set(_ingredients(self._function, set())))]).encode()
+        ).digest()
 
     def _head(self, compiled: bytes) -> bytes:
         return self._stamp + _HASH(compiled).digest()
