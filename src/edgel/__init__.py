@@ -1,11 +1,15 @@
 """Find the edges of 3D point clouds, and their normals, without tuning."""
 
-from edgel import paper
-from edgel._detect import detect
-from edgel._neighbors.normals import Normals, estimate_normals
-from edgel.cloud import Cloud
-from edgel.edges import EdgeKind, Edges
-from edgel.io import FormatError, read, write
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from edgel import paper
+    from edgel._detect import detect
+    from edgel._neighbors.normals import Normals, estimate_normals
+    from edgel.cloud import Cloud
+    from edgel.edges import EdgeKind, Edges
+    from edgel.io import FormatError, read, write
 
 __version__ = "0.1.0.dev0"
 
@@ -21,3 +25,33 @@ __all__ = [
     "read",
     "write",
 ]
+
+# Where each name comes from. It is imported when it is first used: NumPy and Numba take a second, in which the command
+# line already has to answer Ctrl-C.
+_HOMES = {
+    "Cloud": "edgel.cloud",
+    "EdgeKind": "edgel.edges",
+    "Edges": "edgel.edges",
+    "FormatError": "edgel.io",
+    "Normals": "edgel._neighbors.normals",
+    "detect": "edgel._detect",
+    "estimate_normals": "edgel._neighbors.normals",
+    "read": "edgel.io",
+    "write": "edgel.io",
+}
+_ROOMS = ("cloud", "edges", "export", "io", "metrics", "paper", "plot", "synth")
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        value = getattr(import_module(_HOMES[name]), name)
+    elif name in _ROOMS:
+        value = import_module(f"edgel.{name}")
+    else:
+        raise AttributeError(f"module 'edgel' has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOMES, *_ROOMS})

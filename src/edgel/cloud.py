@@ -61,7 +61,9 @@ class Cloud:
         for name, values in self.attributes.items():
             array = unmasked(values, f"attribute {name!r}")
             if array.ndim == 0 or len(array) != len(xyz):
-                raise ValueError(f"attribute {name!r} has shape {array.shape}; its first axis must be {len(xyz)} long")
+                raise ValueError(
+                    f"attribute {name!r:.80} has shape {array.shape}; its first axis must be {len(xyz)} long"
+                )
             attributes[name] = array
         viewpoint = None if self.viewpoint is None else as_vector(self.viewpoint, "viewpoint")
         object.__setattr__(self, "xyz", xyz)
@@ -234,14 +236,15 @@ def unmasked(values: Any, name: str) -> np.ndarray:
     ValueError
         If something is masked and the type has no NaN: texts, records, integers beyond 2^53.
     """
+    masked: Any = values
     if isinstance(values, list | tuple) and any(map(np.ma.isMaskedArray, values)):
-        values = np.ma.array(values)
-    if not np.ma.is_masked(values):
-        return np.asarray(values)
-    numbers = values.astype(np.float64) if values.dtype.kind in "biu" else values
-    beyond = values.dtype.kind in "iu" and np.abs(numbers.compressed()).max(initial=0) > 2**53
+        masked = np.ma.array(values)
+    if not np.ma.is_masked(masked):
+        return np.asarray(masked)
+    numbers = masked.astype(np.float64) if masked.dtype.kind in "biu" else masked
+    beyond = masked.dtype.kind in "iu" and np.abs(numbers.compressed()).max(initial=0) > 2**53
     if numbers.dtype.kind not in "fc" or beyond:
-        raise ValueError(f"{name}: some are masked, and {values.dtype} has no NaN for them; fill them (.filled(value))")
+        raise ValueError(f"{name}: some are masked, and {masked.dtype} has no NaN for them; fill them (.filled(value))")
     return numbers.filled(np.nan)
 
 

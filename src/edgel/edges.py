@@ -251,14 +251,14 @@ def as_kinds(kinds: EdgeKind | str | Iterable[str]) -> EdgeKind:
     flags = EdgeKind(0)
     if isinstance(kinds, int | np.integer):
         if int(kinds) & ~int(ASKABLE):
-            raise ValueError(f"kinds: expected some of {', '.join(kind_names(ASKABLE))}, got {kinds!r}")
+            raise ValueError(f"kinds: expected some of {', '.join(kind_names(ASKABLE))}, got {kinds!r:.80}")
         flags = EdgeKind(int(kinds))
     else:
         for name in [kinds] if isinstance(kinds, str) else kinds:
             if not isinstance(name, str):
-                raise TypeError(f"kinds: expected EdgeKind flags or names of kinds, got {name!r} among them")
+                raise TypeError(f"kinds: expected EdgeKind flags or names of kinds, got {name!r:.80} among them")
             if _NAMES.get(name.lower(), EdgeKind.IMAGE) not in ASKABLE:
-                raise ValueError(f"kinds: {name!r} is unknown; choose from {', '.join(kind_names(ASKABLE))}")
+                raise ValueError(f"kinds: {name!r:.80} is unknown; choose from {', '.join(kind_names(ASKABLE))}")
             flags |= _NAMES[name.lower()]
     if not flags:
         raise ValueError(f"kinds: none is asked for; choose from {', '.join(kind_names(ASKABLE))}")

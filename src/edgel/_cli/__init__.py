@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
+from typer.exceptions import TyperException
 
 import edgel
 from edgel._cli import convert, demo, detect, info, normals, render, view
 from edgel._cli.methods import MethodCommand
 from edgel._cli.options import help_text
+from edgel.io.errors import printable
 
 _HELP = """Find the edges of 3D point clouds, and their normals, without tuning.
 
@@ -24,11 +29,37 @@ Reads PLY, PCD, LAS/LAZ, E57, XYZ/TXT/CSV/ASC/PTS, NPY/NPZ and depth images (PNG
 """
 _EPILOG = (
     "Exit codes: 0 done, 1 an error inside edgel, 2 wrong usage, 3 the input cannot be read, 4 its data cannot be "
-    "processed, 5 the output cannot be written, 130 interrupted."
+    "processed, 5 the output cannot be written, 130 interrupted, "
+    "143 terminated."
 )
+
+
+class Commands(TyperGroup):
+    """The commands; wrong words, as of a shell that put a file's name in their place, are shown and not obeyed."""
+
+    def make_context(self, *args: Any, **extra: Any) -> Any:
+        """Read the words before the command's name."""
+        with _printable_errors():
+            return super().make_context(*args, **extra)
+
+    def invoke(self, ctx: Any) -> Any:
+        """Read the others, and run the command."""
+        with _printable_errors():
+            return super().invoke(ctx)
+
+
+@contextmanager
+def _printable_errors() -> Iterator[None]:
+    try:
+        yield
+    except TyperException as error:
+        error.message = printable(error.message)
+        raise
+
 
 app = typer.Typer(
     name="edgel",
+    cls=Commands,
     no_args_is_help=True,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,

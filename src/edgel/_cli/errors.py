@@ -5,13 +5,14 @@ from __future__ import annotations
 import sys
 import traceback
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from enum import IntEnum
 
 import typer
 
-from edgel._cli.output import print_json, print_line
-from edgel.io.errors import describe_error
+from edgel._cli.output import StdoutError, print_json, print_line
+from edgel._cli.signals import Terminated
+from edgel.io.errors import describe_error, printable
 
 
 class ExitCode(IntEnum):
@@ -24,6 +25,7 @@ class ExitCode(IntEnum):
     DATA = 4
     OUTPUT = 5
     INTERRUPTED = 130
+    TERMINATED = 143
 
 
 class Failure(Exception):  # noqa: N818 - it is what a command ends with, bad input mostly, not an error of its own
@@ -37,7 +39,7 @@ class Failure(Exception):  # noqa: N818 - it is what a command ends with, bad in
     """
 
     def __init__(self, code: ExitCode, message: str) -> None:
-        super().__init__(message)
+        super().__init__(printable(message))
         self.code = code
 
 
@@ -86,6 +88,12 @@ def exit_codes(*, as_json: bool = False, debug: bool = False) -> Iterator[None]:
         raise
     except KeyboardInterrupt:
         code, message = ExitCode.INTERRUPTED, "interrupted; nothing was left half written"
+    except Terminated:
+        code, message = ExitCode.TERMINATED, "terminated; nothing was left half written"
+    except StdoutError as error:
+        if error.is_closed:
+            raise typer.Exit(int(ExitCode.OUTPUT)) from error
+        code, message, as_json = ExitCode.OUTPUT, str(error), False
     except Failure as failure:
         code, message = failure.code, str(failure)
         _show_traceback(debug)
@@ -95,13 +103,15 @@ def exit_codes(*, as_json: bool = False, debug: bool = False) -> Iterator[None]:
     except Exception as error:
         code = ExitCode.INTERNAL
         advice = "please report it with what --debug shows"
-        message = f"an error inside edgel, not of your data ({type(error).__name__}: {error}); {advice}"
+        what = f"{type(error).__name__}: {printable(error, 400)}"
+        message = f"an error inside edgel, not of your data ({what}); {advice}"
         _show_traceback(debug)
     else:
         return
     print_line(f"edgel: {message}", style="bold red")
     if as_json:
-        print_json({"error": message, "code": int(code)})
+        with suppress(StdoutError):
+            print_json({"error": message, "code": int(code)})
     raise typer.Exit(int(code))
 
 
@@ -117,9 +127,10 @@ def as_option(name: str) -> str:
 
 
 def _about(subject: str, message: str) -> str:
+    subject = printable(subject)
     return message if not subject or subject in message else f"{subject}: {message}"
 
 
 def _show_traceback(debug: bool) -> None:
     if debug:
-        traceback.print_exc(file=sys.stderr)
+        sys.stderr.writelines(printable(line, 10_000) + "\n" for line in traceback.format_exc().splitlines())

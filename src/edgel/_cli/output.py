@@ -1,29 +1,69 @@
-"""What the commands print: tables and notices on stderr, JSON on stdout."""
+"""What the commands print: tables and notices on stderr, JSON on stdout, and nothing that could steer the terminal."""
 
 from __future__ import annotations
 
 import json
 import math
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
+
+from edgel.io.errors import describe_error, printable
+
+
+class StdoutError(Exception):
+    """Stdout took no more; `is_closed` where the program that read it has ended, which it may without a word."""
+
+    def __init__(self, error: OSError) -> None:
+        super().__init__(f"stdout: {describe_error(error)}; what was printed is not complete")
+        self.is_closed = isinstance(error, BrokenPipeError)
+
+
+@contextmanager
+def _to_stdout() -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise StdoutError(error) from error
+
+
+class PlainConsole(Console):
+    """Prints text as it is: brackets in a file's name are no markup, and control characters are shown, not sent.
+
+    Every string, also one in a cell of a table, comes through `render_str` before it is shown.
+    """
+
+    def __init__(self, *, stderr: bool = False) -> None:
+        super().__init__(stderr=stderr, markup=False, emoji=False, highlight=False)
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print, or raise `StdoutError`; notices on stderr that nobody can read stop no work."""
+        with suppress(OSError) if self.stderr else _to_stdout():
+            super().print(*objects, **options)
+
+    def on_broken_pipe(self) -> None:
+        """Do as with any other stream that takes no more; called by Rich while it handles the error."""
+        raise  # the BrokenPipeError itself
+
+    def render_str(self, text: str, **style: Any) -> Text:
+        """Turn a string into what is shown of it."""
+        return super().render_str(printable(text), **style)
 
 
 def stderr_console() -> Console:
-    """Return a console that prints text as it is: brackets in a file's name are no markup.
-
-    It is made anew each time, because stderr may be replaced between two commands of one process.
-    """
-    return Console(stderr=True, markup=False, emoji=False, highlight=False)
+    """Return a console for stderr, made anew each time: stderr may be replaced between two commands of a process."""
+    return PlainConsole(stderr=True)
 
 
 def stdout_console() -> Console:
     """Return the same for stdout."""
-    return Console(markup=False, emoji=False, highlight=False)
+    return PlainConsole()
 
 
 def print_line(text: str, *, style: str | None = None) -> None:
@@ -45,9 +85,14 @@ def print_table(title: str, rows: Iterable[tuple[str, ...]], *, console: Console
 
 
 def print_json(values: Mapping[str, Any]) -> None:
-    """Print one JSON object on stdout; NaN and infinities, which JSON has no word for, become null."""
-    sys.stdout.write(json.dumps(_plain(values), indent=2, allow_nan=False, ensure_ascii=False) + "\n")
-    sys.stdout.flush()
+    """Print one JSON object on stdout; NaN and infinities, which JSON has no word for, become null.
+
+    Strings stay exactly what they are, control characters and all beyond ASCII escaped.
+    """
+    text = json.dumps(_plain(values), indent=2, allow_nan=False)
+    with _to_stdout():
+        sys.stdout.write(text + "\n")
+        sys.stdout.flush()
 
 
 def count(number: int) -> str:

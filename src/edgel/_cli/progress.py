@@ -9,6 +9,7 @@ from numba.core import event
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from edgel._cli.output import print_line, seconds, stderr_console
+from edgel._kernels.cache import KernelCache
 
 COMPILING = "compiling kernels, first run only"
 
@@ -55,8 +56,11 @@ class Watch(event.Listener):
         event.unregister("numba:compile", self)
         if self._bar is not None:
             self._bar.stop()
-        if self._told and self.compile_seconds > 1:
-            print_line(f"compiled kernels in {seconds(self.compile_seconds)}; later runs start at once", style="dim")
+        if error is None and self._told and self.compile_seconds > 1:
+            later = (
+                "start at once" if KernelCache.keeps else "will too: set NUMBA_CACHE_DIR to a folder to keep them in"
+            )
+            print_line(f"compiled kernels in {seconds(self.compile_seconds)}; later runs {later}", style="dim")
 
     def on_start(self, event: event.Event) -> None:
         """Tell of a kernel whose compilation begins; called by Numba."""

@@ -56,7 +56,7 @@ def view(
             raise Failure(ExitCode.USAGE, f"the viewer needs viser, which is not there ({error}); {remedy}") from error
         if host not in _LOCAL:
             print_line(
-                f"--host {host}: whoever can reach this machine can see the clouds and press every button",
+                f"--host {host}: whoever learns the page's address can see the clouds and press every button",
                 style="yellow",
             )
         try:

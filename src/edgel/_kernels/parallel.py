@@ -14,12 +14,21 @@ from typing import Any, TypeVar
 
 from numba import njit
 
+from edgel._kernels.cache import KernelCache
+
 F = TypeVar("F", bound=Callable[..., Any])
+
+
+def _compiled(function: F, **options: Any) -> F:
+    compiled: Any = njit(nogil=True, **options)(function)
+    if compiled is not function:  # as it is under NUMBA_DISABLE_JIT
+        compiled._cache = KernelCache(function)
+    return compiled
 
 
 def kernel(function: F) -> F:
     """Compile a function to machine code, without the GIL, kept on disk between runs."""
-    return njit(nogil=True, cache=True)(function)  # pyright: ignore[reportReturnType]
+    return _compiled(function)
 
 
 def summing_kernel(function: F) -> F:
@@ -28,13 +37,12 @@ def summing_kernel(function: F) -> F:
     The order depends on the loop alone, so results stay the same for any number of threads; NaN and infinity keep their
     meaning. The moments of 32 neighbours take a quarter of the time so.
     """
-    return njit(nogil=True, cache=True, fastmath={"reassoc", "nsz", "contract"})(function)  # pyright: ignore[reportReturnType]
+    return _compiled(function, fastmath={"reassoc", "nsz", "contract"})
 
 
 def part(function: F) -> F:
     """Compile a part of kernels, which is inlined (an array passed costs seven words); Python cannot call it."""
-    options: dict[str, Any] = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    return njit(nogil=True, cache=True, **options)(function)  # pyright: ignore
+    return _compiled(function, forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
 def num_threads() -> int:

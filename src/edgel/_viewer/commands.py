@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import shlex
 from pathlib import Path
 
@@ -35,7 +36,7 @@ def command_line(pane: Pane, settings: Settings) -> str:
             words += ["--min-angle", f"{math.degrees(settings.angle):g}"]
     if settings.is_cropped:
         words += ["--crop", *map(repr, pane.box.ravel().tolist())]
-    return shlex.join([*words, "-o", output_name(pane)])
+    return " ".join(map(_word, [*words, "-o", output_name(pane)]))
 
 
 def python_lines(pane: Pane, settings: Settings) -> str:
@@ -75,6 +76,18 @@ def _options(settings: Settings) -> list[str]:
     if settings.strength != LIKELY:
         options.append(f"min_strength={settings.strength:g}")
     return options
+
+
+def _word(word: str) -> str:
+    r"""Quote a word for the shell, so that no character of it acts on the way there.
+
+    >>> _word("a b.ply"), _word("a\x1b[31m.ply")
+    ("'a b.ply'", "$'a\\x1b[31m.ply'")
+    """
+    if word.isprintable():
+        return shlex.quote(word)
+    shown = (c if c.isprintable() and c not in "\\'" else "".join(f"\\x{b:02x}" for b in os.fsencode(c)) for c in word)
+    return f"$'{''.join(shown)}'"
 
 
 def _number(value: float) -> str:

@@ -18,7 +18,7 @@ from edgel._viewer.latest import Latest
 from edgel._viewer.pick import Picked, Row, describe, find, pick, row_of
 from edgel._viewer.save import edges_file, picture_file, png
 from edgel._viewer.session import Pane, Session
-from edgel.io.errors import describe_error
+from edgel.io.errors import describe_error, printable
 from edgel.paper import PaperEdges
 
 _HEAD_START = 0.005  # seconds in which the texts leave before the scene
@@ -167,4 +167,4 @@ class Page:
         except (ValueError, TypeError, ImportError, OSError, MemoryError) as error:
             event.client.add_notification("Could not be saved", describe_error(error), color="red")
             return
-        event.client.send_file_download(name, content, save_immediately=True)
+        event.client.send_file_download(printable(name), content, save_immediately=True)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import functools
 import io
 import os
-import re
 import socket
 import sys
 import threading
@@ -15,16 +13,13 @@ from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
 
 import viser
-import websockets.asyncio.server
 
+from edgel._viewer.guard import LOCAL, Guard
 from edgel._viewer.page import Page
 from edgel._viewer.session import Session
 
-LOCAL = ("127.0.0.1", "localhost", "::1")
 DEFAULT_PORT = 8080
 _TRIED_PORTS = 100
-# Any page in the browser may try to connect to this machine. Only those that came from it are let in.
-_LOCAL_PAGES = re.compile(r"https?://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?")
 
 
 def serve(
@@ -79,10 +74,11 @@ def running(
 ) -> Iterator[Viewer]:
     """Serve the page for as long as the ``with`` lasts; as `serve`, which waits for Ctrl-C."""
     session = Session(paths, intrinsics=intrinsics)
-    server = _listen(host, _free_port(host, port))
+    guard = Guard(host)
+    server = _listen(host, _free_port(host, port), guard)
     page = Page(server, session)
     try:
-        yield Viewer(_address(host, server.get_port()), session, page)
+        yield Viewer(_address(host, server.get_port(), guard.token), session, page)
     finally:
         session.close()
         page.close()
@@ -90,22 +86,16 @@ def running(
             server.stop()
 
 
-def _listen(host: str, port: int) -> viser.ViserServer:
-    """Start viser without its banner, and closed to pages from elsewhere unless the address is open anyway."""
-    original = websockets.asyncio.server.serve
-    if host in LOCAL:
-        websockets.asyncio.server.serve = functools.partial(original, origins=[_LOCAL_PAGES, None])
-    try:
-        with redirect_stdout(io.StringIO()):
-            return viser.ViserServer(host, port, verbose=False)
-    finally:
-        websockets.asyncio.server.serve = original
+def _listen(host: str, port: int, guard: Guard) -> viser.ViserServer:
+    """Start viser without its banner, and behind a guard."""
+    with guard.at_the_door(), redirect_stdout(io.StringIO()):
+        return viser.ViserServer(host, port, verbose=False)
 
 
-def _address(host: str, port: int) -> str:
+def _address(host: str, port: int, token: str) -> str:
     """Return what to type into the browser of this machine."""
     shown = "localhost" if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
-    return f"http://{shown}:{port}"
+    return f"http://{shown}:{port}/{token}/"
 
 
 def _free_port(host: str, port: int | None) -> int:

@@ -20,7 +20,7 @@ from edgel._viewer.settings import Settings
 from edgel._viewer.source import Source
 from edgel.cloud import Cloud
 from edgel.edges import Edges
-from edgel.io.errors import describe_error
+from edgel.io.errors import describe_error, printable
 
 _KEPT = 24  # answers remembered, so that moving back is immediate
 
@@ -90,7 +90,7 @@ class Session:
         self.sources = [Source(path, intrinsics=intrinsics, read=read) for path in paths]
         for source in self.sources:
             if [other.name for other in self.sources].count(source.name) > 1:
-                source.name = source.path
+                source.name = printable(source.path)
         self.doing = ""
         self._settings = Settings()
         self._changed: Callable[[], None] = lambda: None

@@ -17,7 +17,7 @@ from edgel._neighbors.spacing import median_spacing
 from edgel._neighbors.thinning import thin_to
 from edgel._viewer.settings import Settings
 from edgel.cloud import Cloud, check_points, in_box
-from edgel.io.errors import describe_error
+from edgel.io.errors import describe_error, printable
 from edgel.plot.camera import Camera, choose_camera
 
 MAX_SHOWN = 3_000_000  # points that a browser turns without stutter
@@ -83,7 +83,7 @@ class Source:
         intrinsics: str | os.PathLike[str] | None = None,
         read: Callable[..., Cloud] = edgel.read,
     ) -> None:
-        self.path, self.name, self.intrinsics = os.fspath(path), Path(path).name, intrinsics
+        self.path, self.name, self.intrinsics = os.fspath(path), printable(Path(path).name), intrinsics
         self._read = read
         self.cloud: Cloud | None = None
         self.error = ""

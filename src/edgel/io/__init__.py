@@ -13,7 +13,7 @@ from typing import Any, BinaryIO, NoReturn
 from edgel.cloud import Cloud
 from edgel.io import depth, e57, e57_write, npy, pcd, ply, text
 from edgel.io.depth import Intrinsics, read_intrinsics
-from edgel.io.errors import FormatError
+from edgel.io.errors import FormatError, printable
 from edgel.io.files import check_readable, describe
 
 __all__ = ["READERS", "WRITERS", "FormatError", "Intrinsics", "read", "read_intrinsics", "write"]
@@ -114,7 +114,7 @@ def read(
     if intrinsics is None:
         return READERS[extension](path)
     if extension not in (*_DEPTH, ".npy"):
-        raise ValueError(f"intrinsics: {os.fspath(path)} is no depth image ({', '.join(_DEPTH)}, .npy); leave them out")
+        raise ValueError(f"intrinsics: {printable(path)} is no depth image ({', '.join(_DEPTH)}, .npy); leave them out")
     return depth.read(path, intrinsics=intrinsics)
 
 

@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO, NoReturn
 
-from edgel.io.errors import FormatError
+from edgel.io.errors import FormatError, printable
 
 try:
     import fcntl
@@ -97,9 +97,9 @@ def check_readable(path: str | os.PathLike[str]) -> None:
     try:
         status = os.stat(path)
     except FileNotFoundError:
-        raise FileNotFoundError(f"{os.fspath(path)}: no such file; check the name and the folder") from None
+        raise FileNotFoundError(f"{printable(path)}: no such file; check the name and the folder") from None
     if stat.S_ISDIR(status.st_mode):
-        raise IsADirectoryError(f"{os.fspath(path)}: is a folder; pass one file of it")
+        raise IsADirectoryError(f"{printable(path)}: is a folder; pass one file of it")
     if stat.S_ISREG(status.st_mode) and status.st_size == 0:
         raise FormatError(f"{os.fspath(path)}: the file is empty; write it again")
 
@@ -143,7 +143,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         try:
             os.replace(file.name, target)
         except OSError as error:
-            raise type(error)(f"{os.fspath(path)}: cannot be replaced ({error.strerror}); name another file") from error
+            raise type(error)(f"{printable(path)}: cannot be replaced ({error.strerror}); name another file") from error
         _sync_folder(target.parent)
 
 
@@ -160,11 +160,11 @@ def check_replaceable(path: str | os.PathLike[str]) -> os.stat_result | None:
     except (FileNotFoundError, NotADirectoryError):
         return None
     if stat.S_ISDIR(status.st_mode):
-        raise IsADirectoryError(f"{os.fspath(path)}: is a folder; name the file to write")
+        raise IsADirectoryError(f"{printable(path)}: is a folder; name the file to write")
     if stat.S_ISBLK(status.st_mode):
-        raise PermissionError(f"{os.fspath(path)}: is a disk, not a file; name the file to write")
+        raise PermissionError(f"{printable(path)}: is a disk, not a file; name the file to write")
     if not os.access(path, os.W_OK):
-        raise PermissionError(f"{os.fspath(path)}: is protected from writing; name another file, or chmod it")
+        raise PermissionError(f"{printable(path)}: is protected from writing; name another file, or chmod it")
     return status
 
 
@@ -178,7 +178,7 @@ def _temporary(path: str | os.PathLike[str], folder: Path, old: os.stat_result |
             file = _create(name, mode)
         except OSError as error:
             reason = "the folder does not exist" if isinstance(error, FileNotFoundError) else error.strerror
-            raise type(error)(f"{os.fspath(path)}: cannot be written ({reason}); choose another folder") from error
+            raise type(error)(f"{printable(path)}: cannot be written ({reason}); choose another folder") from error
         with file:
             if old is not None and hasattr(os, "fchown"):
                 with suppress(PermissionError):  # only root gives files away
