@@ -73,9 +73,9 @@ class KernelCache(NullCache):
 
     @cached_property
     def _stamp(self) -> bytes:
-        return _HASH(
-            "\0".join([numba.__version__, *sorted(set(_ingredients(self._function, set())))]).encode()
-        ).digest()
+        ingredients = sorted(set(_ingredients(self._function, set())))
+        checked = f"bounds checked: {bool(numba.config.BOUNDSCHECK)}"  # pyright: ignore[reportAttributeAccessIssue]
+        return _HASH("\0".join([numba.__version__, checked, *ingredients]).encode()).digest()
 
     def _head(self, compiled: bytes) -> bytes:
         return self._stamp + _HASH(compiled).digest()
@@ -89,7 +89,7 @@ class KernelCache(NullCache):
 
 
 def _ingredients(function: Callable[..., Any], seen: set[Any]) -> Iterator[str]:
-    """Yield all that is compiled into a function: the files of it and of the functions it calls, and their constants."""
+    """Yield what is compiled into a function: its file, those of the functions it calls, and their constants."""
     if function in seen:
         return
     seen.add(function)
