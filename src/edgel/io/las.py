@@ -33,7 +33,7 @@ def _foreign_errors(path: object, doing: str) -> Iterator[None]:
         yield
     except FormatError:
         raise
-    except (KeyboardInterrupt, SystemExit, GeneratorExit):
+    except (MemoryError, KeyboardInterrupt, SystemExit, GeneratorExit):
         raise
     except BaseException as error:
         # A panic of lazrs (Rust) is a BaseException, which `except Exception` lets through; others of its kind pass.
@@ -104,7 +104,7 @@ def read(path: str | os.PathLike[str]) -> Cloud:
 
 def _check_records(path: str, file: BinaryIO, head: bytes, size: int) -> None:
     """Compare the promised records with the file's size: laspy would read billions of empty ones."""
-    num_extended = int.from_bytes(head[243:247], "little") if head[25] >= 4 else 0
+    num_extended = int.from_bytes(head[243:247], "little") if head[25:26] >= b"\x04" else 0
     for count, length in ((int.from_bytes(head[100:104], "little"), 54), (num_extended, 60)):
         if count * length > size:
             raise FormatError(f"{path}: declared {count} header records, the file has {size} bytes; get the file again")

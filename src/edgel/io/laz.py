@@ -100,7 +100,9 @@ class ChunkReader:
     def _check_layers(self, chunk: bytes) -> None:
         """Compare the promised layers with the chunk: a first point, the number of points, sizes, layers."""
         head = self._point_size + 4
-        sizes = np.frombuffer(chunk, "<u4", min(self._num_layers, max(len(chunk) - head, 0) // 4), min(head, len(chunk)))
+        sizes = np.frombuffer(
+            chunk, "<u4", min(self._num_layers, max(len(chunk) - head, 0) // 4), min(head, len(chunk))
+        )
         if len(sizes) < self._num_layers or int(sizes.sum(dtype=np.uint64)) > len(chunk) - head - sizes.nbytes:
             raise FormatError(
                 f"{self._path}: the layers of a chunk are larger than its {len(chunk)} bytes; the file is damaged: "
@@ -117,7 +119,9 @@ def _check_record(path: str, record: bytes, point_format: laspy.PointFormat) -> 
         If it is cut off, describes other points, or is of a kind that lazrs does not know.
     """
     num_items = int.from_bytes(record[32:34], "little")
-    items = list(struct.iter_unpack("<3H", record[34 : 34 + 6 * num_items])) if len(record) >= 34 + 6 * num_items else []
+    items = (
+        list(struct.iter_unpack("<3H", record[34 : 34 + 6 * num_items])) if len(record) >= 34 + 6 * num_items else []
+    )
     compressor = int.from_bytes(record[:2], "little")
     expected = bytes(lazrs.LazVlr.new_for_compression(point_format.id, point_format.num_extra_bytes).record_data())
     same = [item[:2] for item in items] == [item[:2] for item in struct.iter_unpack("<3H", expected[34:])]

@@ -9,8 +9,8 @@ from edgel.io.errors import FormatError
 # Packed data may unpack to 100 times the file, which no scan comes near, and small files to 64 MiB in any case.
 _ALWAYS = 1 << 26
 _MOST_RATIO = 100
-# A line of points is some hundred characters long; a file without line ends is no text.
-LONGEST_LINE = 1 << 16
+# A line of points is some hundred characters long, with a histogram a few thousand.
+LONGEST_LINE = 1 << 20
 # A header is a few kilobytes; with an embedded protocol of the measurement perhaps a hundred.
 LONGEST_HEADER = 1 << 20
 

@@ -52,7 +52,7 @@ def read_picture(path: str) -> np.ndarray:
                     _check_pixels(path, *picture.size)
                     (_check_png if picture.format == "PNG" else _check_tiff)(path, raw, picture)
                     return np.array(picture)
-    except FormatError:
+    except (FormatError, MemoryError):
         raise
     except (Image.DecompressionBombWarning, Image.DecompressionBombError):
         raise FormatError(f"{path}: has over {_MOST_PIXELS} pixels (8192 x 8192), the most that are read") from None

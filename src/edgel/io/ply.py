@@ -13,7 +13,7 @@ from edgel.cloud import Cloud
 from edgel.io.columns import find_xyz, fits_float32, flat_attributes, one_line
 from edgel.io.errors import FormatError
 from edgel.io.files import reading, replacing
-from edgel.io.limits import whole_number
+from edgel.io.limits import LONGEST_LINE, whole_number
 from edgel.io.ply_grid import range_grid, read_grid, spread
 from edgel.io.ply_header import NAMES, Element, Header, cut_off, read_header
 from edgel.io.ply_lists import gather, skip, walk
@@ -112,6 +112,8 @@ def _read_ascii(
 
 
 def _without_lists(path: str, row: str, vertex: Element) -> str:
+    if len(row) > LONGEST_LINE:
+        raise FormatError(f"{path}: vertex line {row[:60]!r} is {len(row)} characters long; mend the file")
     words = row.split()
     kept, position = [], 0
     for p in vertex.properties:
