@@ -24,7 +24,7 @@ def read_array(path: str, file: IO[bytes], size: int) -> np.ndarray:
     try:
         readers = {1: npy_format.read_array_header_1_0, 2: npy_format.read_array_header_2_0}
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # headers that Python 2 wrote
+            warnings.simplefilter("ignore")  # headers that Python 2 wrote, and words that are no Python
             shape, fortran, dtype = readers[min(head[6], 2)](file)
     except Exception as error:  # the header is a Python literal: many errors are possible, all mean a damaged file
         raise FormatError(f"{path}: the .npy header is damaged ({error}); get the file again") from None

@@ -176,7 +176,7 @@ def read(path: str | os.PathLike[str], *, intrinsics: Intrinsics | str | os.Path
     scale = camera.depth_scale or (1.0 if image.dtype.kind == "f" else 0.001)
     rows, cols = np.arange(height)[:, None], np.arange(width)
     xyz = np.empty((height, width, 3))
-    with np.errstate(over="ignore"):  # an absurd depth becomes infinite: a point that is not there
+    with np.errstate(over="ignore", invalid="ignore"):  # an absurd depth becomes infinite: a point that is not there
         z = image * np.float64(scale)
         z[~(np.isfinite(z) & (z > 0))] = np.nan
         xyz[..., 2] = z

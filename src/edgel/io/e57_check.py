@@ -37,7 +37,9 @@ def check_xml(path: str, file: BinaryIO, size: int) -> None:
     payload = b"".join(pages[at : at + _PAYLOAD] for at in range(0, len(pages), _PAGE))
     try:
         _Counter(path).parse(payload[start % _PAGE :][:length])
-    except expat.ExpatError as error:
+    except (expat.ExpatError, ValueError) as error:
+        if isinstance(error, FormatError):
+            raise
         raise FormatError(f"{path}: the XML section of the E57 file is damaged ({error}); get it again") from None
 
 
@@ -46,13 +48,19 @@ class _Counter:
         self._path = path
         self._num_elements = 0
         self._num_children = [0]
-        self._parser = expat.ParserCreate()
+        # E57 is UTF-8 whatever the text says: another encoding would hide from one parser what the other sees.
+        self._parser = expat.ParserCreate("utf-8")
+        self._parser.XmlDeclHandler = self._check_encoding
         self._parser.StartDoctypeDeclHandler = self._refuse
         self._parser.StartElementHandler = self._open
         self._parser.EndElementHandler = self._close
 
     def parse(self, text: bytes) -> None:
         self._parser.Parse(text, True)
+
+    def _check_encoding(self, _: str, encoding: str | None, __: int) -> None:
+        if encoding is not None and encoding.lower() not in ("utf-8", "us-ascii"):
+            raise FormatError(f"{self._path}: its XML section is in {encoding[:60]!r}, not UTF-8; get the file again")
 
     def _refuse(self, *_: Any) -> None:
         raise FormatError(f"{self._path}: its XML section declares a document type, which E57 has not; get it again")

@@ -108,14 +108,15 @@ def _check_records(path: str, file: BinaryIO, head: bytes, size: int) -> None:
     for count, length in ((int.from_bytes(head[100:104], "little"), 54), (num_extended, 60)):
         if count * length > size:
             raise FormatError(f"{path}: declared {count} header records, the file has {size} bytes; get the file again")
-    places = [int.from_bytes(head[96:100], "little"), int.from_bytes(head[235:243], "little") if num_extended else 0]
+    place, end = int.from_bytes(head[235:243], "little"), int.from_bytes(head[96:100], "little")
     for _ in range(num_extended):
-        if places[-1] + 60 > size:
+        file.seek(min(place + 20, size))
+        place += 60 + int.from_bytes(file.read(8), "little")
+        end = max(end, place)
+        if end > size:
             break
-        file.seek(places[-1] + 20)
-        places.append(places[-1] + 60 + int.from_bytes(file.read(8), "little"))
-    if max(places) > size:
-        raise FormatError(f"{path}: declared records up to byte {max(places)}, found {size}; get the file again")
+    if end > size:
+        raise FormatError(f"{path}: declared records up to byte {end}, found {size}; get the file again")
 
 
 def _check_size(path: str, header: laspy.LasHeader, size: int) -> None:

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import struct
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any, BinaryIO
 
 import laspy
@@ -15,6 +11,7 @@ import numpy as np
 
 from edgel.io.errors import FormatError
 from edgel.io.limits import check_unpacked
+from edgel.io.quiet import quiet_decoder
 
 _CHUNKED, _LAYERED = 2, 3
 # Versions of items that go with a compressor.
@@ -91,7 +88,7 @@ class ChunkReader:
                 self._check_layers(packed[position : position + size])
             position += size
         points = bytearray(sum(count for count, _ in chunks) * self._point_size)
-        with _silent():
+        with quiet_decoder():
             lazrs.decompress_points_with_chunk_table(
                 packed, self._record, points, chunks, lazrs.DecompressionSelection(lazrs.SELECTIVE_DECOMPRESS_ALL)
             )
@@ -166,7 +163,7 @@ def _read_chunk_table(
             f"{path}: reading LAS failed (declared {num_chunks} chunks in {room} bytes); get the file again"
         )
     source.seek(start)
-    with _silent():
+    with quiet_decoder():
         table = lazrs.read_chunk_table(source, lazrs.LazVlr(record))
     source.seek(start + 8)
     if int.from_bytes(record[12:16], "little") != _VARIABLE and table:
@@ -182,23 +179,3 @@ def _read_chunk_table(
     for count, length in table:
         check_unpacked(path, count * header.point_format.size, length, ratio=_MOST_RATIO)
     return table
-
-
-_lock = threading.Lock()
-
-
-@contextmanager
-def _silent() -> Iterator[None]:
-    """Keep what Rust prints over a panic off the screen; the exception says it.
-
-    It writes to the file descriptor, not to ``sys.stderr``. One thread at a time: two would restore each other's null.
-    """
-    with _lock:
-        null, kept = os.open(os.devnull, os.O_WRONLY), os.dup(2)
-        os.dup2(null, 2)
-        try:
-            yield
-        finally:
-            os.dup2(kept, 2)
-            os.close(kept)
-            os.close(null)

@@ -12,6 +12,7 @@ import numpy as np
 
 from edgel.io.errors import FormatError
 from edgel.io.files import reading, wrong_magic
+from edgel.io.quiet import quiet_decoder
 
 # 8192 x 8192: above the largest depth cameras and range images there are.
 _MOST_PIXELS = 1 << 26
@@ -43,7 +44,7 @@ def read_picture(path: str) -> np.ndarray:
     try:
         if not raw.startswith(_PNG):
             _check_fields(path, raw)
-        with warnings.catch_warnings():
+        with quiet_decoder(), warnings.catch_warnings():
             warnings.simplefilter("error")  # what Pillow warns of is damage ...
             warnings.filterwarnings("ignore", "Metadata Warning")  # ... but for a field of too many values
             with Image.open(BytesIO(raw)) as picture:
