@@ -86,7 +86,7 @@ def mutate(reader: str, number: int, seeds: list[tuple[str, bytes]]) -> tuple[st
         return suffix, _in_archive(rng, content)
     raw = _change(rng, content, other)
     if rng.random() < 0.8:  # the checksums are right again, else nothing behind them would be tried
-        raw = {"png": _mend_png, "e57": _mend_e57}.get(reader, bytes)(raw)
+        raw = {"png": _mend_png, "e57": mend_e57}.get(reader, bytes)(raw)
     return suffix, raw
 
 
@@ -136,7 +136,7 @@ def _table() -> list[int]:
 _CRC32C = _table()
 
 
-def _mend_e57(raw: bytes) -> bytes:
+def mend_e57(raw: bytes) -> bytes:
     """Give each page of 1024 bytes its checksum, and the header its length."""
     mended = bytearray(raw[: len(raw) // 1024 * 1024])
     if len(mended) >= 24:
