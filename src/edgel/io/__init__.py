@@ -10,6 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, BinaryIO, NoReturn
 
+import numpy as np
+
 from edgel.cloud import Cloud
 from edgel.io import depth, e57, e57_write, npy, pcd, ply, text
 from edgel.io.depth import Intrinsics, read_intrinsics
@@ -104,6 +106,12 @@ def read(
     ...     read(f"{folder}/a.ply")
     Cloud(3 points, unorganized; attributes: label)
     """
+    # A NaN of a damaged or foreign file is a point that is missing, not a fault of arithmetic to warn of.
+    with np.errstate(all="ignore"):
+        return _read(path, intrinsics)
+
+
+def _read(path: str | os.PathLike[str] | BinaryIO, intrinsics: Intrinsics | str | os.PathLike[str] | None) -> Cloud:
     if not isinstance(path, (str, os.PathLike)):
         _check_stream(path, "read")
         return ply.read(path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from typing import IO
 
@@ -10,6 +11,9 @@ from numpy.lib import format as npy_format
 
 from edgel.io.errors import FormatError
 from edgel.io.files import wrong_magic
+
+# A cloud has three axes, what lies beside it in an archive perhaps a few more; NumPy knows 64.
+_MOST_AXES = 32
 
 
 def read_array(path: str, file: IO[bytes], size: int) -> np.ndarray:
@@ -20,7 +24,7 @@ def read_array(path: str, file: IO[bytes], size: int) -> np.ndarray:
     try:
         readers = {1: npy_format.read_array_header_1_0, 2: npy_format.read_array_header_2_0}
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # headers that Python 2 wrote
+            warnings.simplefilter("ignore")  # headers that Python 2 wrote, and words that are no Python
             shape, fortran, dtype = readers[min(head[6], 2)](file)
     except Exception as error:  # the header is a Python literal: many errors are possible, all mean a damaged file
         raise FormatError(f"{path}: the .npy header is damaged ({error}); get the file again") from None
@@ -28,10 +32,8 @@ def read_array(path: str, file: IO[bytes], size: int) -> np.ndarray:
         raise FormatError(f"{path}: holds Python objects, which may run code when loaded; save plain numbers")
     if any(length < 0 for length in shape):
         raise FormatError(f"{path}: the .npy header promises an array of shape {shape}; get the file again")
-    count = 1
-    for length in shape:  # Python's integers do not overflow
-        count *= length
-    if count * dtype.itemsize > size:
+    count = math.prod(shape)  # Python's integers do not overflow
+    if count * max(dtype.itemsize, 1) > size or len(shape) > _MOST_AXES or max(shape, default=0) > size:
         raise FormatError(
             f"{path}: declared an array of shape {shape}, the file has {size} bytes; it is cut off: get it again"
         )
@@ -39,5 +41,5 @@ def read_array(path: str, file: IO[bytes], size: int) -> np.ndarray:
     if len(raw) < count * dtype.itemsize:
         found = len(raw) // dtype.itemsize
         raise FormatError(f"{path}: declared {count} values, found {found}; the file is cut off: get it again")
-    array = np.frombuffer(bytearray(raw), dtype, count) if dtype.itemsize else np.empty(count, dtype)
+    array = np.frombuffer(bytearray(raw), dtype, count) if raw else np.empty(count, dtype)
     return array.reshape(shape, order="F" if fortran else "C")

@@ -6,7 +6,6 @@ import json
 import math
 import os
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +14,11 @@ import numpy as np
 from edgel.cloud import Cloud
 from edgel.io.arrays import read_array
 from edgel.io.errors import FormatError
-from edgel.io.files import reading, wrong_magic
+from edgel.io.files import reading
+from edgel.io.picture import read_picture
 
-_MODES = ("I;16", "I;16B", "I;16L", "I;16N", "I", "F")
+# A file of intrinsics is some hundred bytes long.
+_LONGEST_JSON = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -83,8 +84,10 @@ def read_intrinsics(path: str | os.PathLike[str]) -> Intrinsics:
     """
     name = os.fspath(path)
     with reading(path) as file:
-        raw = file.read()
+        raw = file.read(_LONGEST_JSON + 1)
     try:
+        if len(raw) > _LONGEST_JSON:
+            raise ValueError(f"it is longer than {_LONGEST_JSON} bytes")
         entries = json.loads(raw)
     except (ValueError, RecursionError) as error:
         raise FormatError(
@@ -171,10 +174,14 @@ def read(path: str | os.PathLike[str], *, intrinsics: Intrinsics | str | os.Path
             "pass those of this image"
         )
     scale = camera.depth_scale or (1.0 if image.dtype.kind == "f" else 0.001)
-    z = image * np.float64(scale)
-    z[~(np.isfinite(z) & (z > 0))] = np.nan
     rows, cols = np.arange(height)[:, None], np.arange(width)
-    xyz = np.stack([(cols - camera.cx) / camera.fx * z, (rows - camera.cy) / camera.fy * z, z], axis=-1)
+    xyz = np.empty((height, width, 3))
+    with np.errstate(over="ignore", invalid="ignore"):  # an absurd depth becomes infinite: a point that is not there
+        z = image * np.float64(scale)
+        z[~(np.isfinite(z) & (z > 0))] = np.nan
+        xyz[..., 2] = z
+        np.multiply((cols - camera.cx) / camera.fx, z, out=xyz[..., 0])
+        np.multiply((rows - camera.cy) / camera.fy, z, out=xyz[..., 1])
     return Cloud(xyz, viewpoint=np.zeros(3))
 
 
@@ -183,30 +190,11 @@ def _read_image(path: str) -> np.ndarray:
         with reading(path) as file:
             image = read_array(path, file, os.fstat(file.fileno()).st_size)
     else:
-        image = _read_picture(path)
+        image = read_picture(path)
     if image.ndim == 3 and image.shape[2] == 1:
         image = image[:, :, 0]
     if image.ndim != 2 or image.dtype.kind not in "iuf" or not image.size:
         raise FormatError(f"{path}: {image.dtype} of shape {image.shape} is no depth image; (H, W) numbers are needed")
-    return image
-
-
-def _read_picture(path: str) -> np.ndarray:
-    from PIL import Image  # not at the top: most files are no images
-
-    with reading(path) as file:
-        raw = file.read()
-    if not raw.startswith((b"\x89PNG\r\n\x1a\n", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")):
-        wrong_magic(path, "a PNG or TIFF image", raw[:512])
-    try:
-        with Image.open(BytesIO(raw)) as picture:
-            mode, frames = picture.mode, getattr(picture, "n_frames", 1)
-            image = np.array(picture) if mode in _MODES and frames == 1 else None
-    except Exception as error:  # Pillow's decoders raise whatever a damaged byte leads them to
-        raise FormatError(f"{path}: the image is damaged ({error}); get it again") from None
-    if image is None:
-        what = f"{frames} images" if frames > 1 else f"a picture of mode {mode}, not depth"
-        raise FormatError(f"{path}: holds {what}; one channel of 16 bits or float is needed")
     return image
 
 

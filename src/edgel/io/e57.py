@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 
 from edgel.cloud import Cloud
+from edgel.io.e57_check import check_xml
 from edgel.io.e57_write import CARTESIAN, GRID, NAMES, PREFIX, SPHERICAL, library
 from edgel.io.errors import FormatError
 from edgel.io.files import reading, wrong_magic
+from edgel.io.limits import check_unpacked
 
 # The smallest of these that holds a field's bounds is its type.
 _INTEGERS = [np.dtype(code) for code in ("u1", "i1", "u2", "i2", "u4", "i4", "i8")]
@@ -67,9 +69,11 @@ def read(path: str | os.PathLike[str]) -> Cloud:
     if declared > size:
         raise FormatError(f"{name}: declared {declared} bytes, found {size}; the file is cut off: get it again")
     lib = library(name)
+    with reading(path) as file:
+        check_xml(name, file, size)
     try:
         scans, num_images = _read_scans(name, lib, size)
-    except FormatError:
+    except (FormatError, MemoryError):
         raise
     except Exception as error:  # libe57 has its own base of errors, and its bindings raise others
         reason = str(error).strip().splitlines()
@@ -89,25 +93,38 @@ def _read_scans(path: str, lib: ModuleType, size: int) -> tuple[list[_Scan], int
         if not root.isDefined("data3D"):
             return [], 0
         data = root["data3D"]
+        layouts = [_layout(lib, data[i]["points"]) for i in range(len(data))]
+        # All scans together: they may point to the same bytes.
+        bits = sum(count * sum(bits for _, bits in types.values()) for count, types in layouts)
+        if bits > 8 * size:
+            num_points = sum(count for count, _ in layouts)
+            raise FormatError(
+                f"{path}: its scans declare {num_points} points, the file has {size} bytes; it is damaged: get it again"
+            )
+        # Fields of one value take no bits at all, but memory.
+        bytes_each = (24 + sum(dtype.itemsize for dtype, _ in types.values()) for _, types in layouts)
+        check_unpacked(path, sum(c * b for (c, _), b in zip(layouts, bytes_each, strict=True)), size)
         num_images = len(root["images2D"]) if root.isDefined("images2D") else 0
-        return [_read_scan(path, lib, image, data[i], size) for i in range(len(data))], num_images
+        return [_read_scan(path, lib, image, data[i], *layouts[i]) for i in range(len(data))], num_images
     finally:
         image.close()
 
 
-def _read_scan(path: str, lib: ModuleType, image: Any, node: Any, size: int) -> _Scan:
-    points = node["points"]
+def _layout(lib: ModuleType, points: Any) -> tuple[int, dict[str, tuple[np.dtype, int]]]:
+    """Return how many points a scan declares, and type and bits of each field that is a number."""
     prototype = lib.StructureNode(points.prototype())
     types = {}
     for i in range(prototype.childCount()):
         dtype, bits = _field_type(lib, prototype[i])
         if dtype is not None:
             types[prototype[i].elementName()] = (dtype, bits)
-    count = points.childCount()
-    if count * sum(bits for _, bits in types.values()) > 8 * size:
-        raise FormatError(
-            f"{path}: a scan declares {count} points, the file has {size} bytes; it is damaged: get it again"
-        )
+    return points.childCount(), types
+
+
+def _read_scan(
+    path: str, lib: ModuleType, image: Any, node: Any, count: int, types: dict[str, tuple[np.dtype, int]]
+) -> _Scan:
+    points = node["points"]
     columns = {name: np.zeros(count, _buffer_type(dtype)) for name, (dtype, _) in types.items()}
     if count:
         buffers = lib.VectorSourceDestBuffer()

@@ -6,6 +6,7 @@ import logging
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any, BinaryIO
 
 import laspy
 import numpy as np
@@ -16,6 +17,7 @@ from edgel.io.errors import FormatError
 from edgel.io.files import reading, replacing, wrong_magic
 from edgel.io.las_crs import crs_of
 from edgel.io.las_header import choose_grid, fit_dimensions, header_for
+from edgel.io.laz import CheckedLaz
 
 # laspy logs an error before it raises it, which Python prints when nobody listens; the exception says the same.
 logging.getLogger("laspy").addHandler(logging.NullHandler())
@@ -31,7 +33,7 @@ def _foreign_errors(path: object, doing: str) -> Iterator[None]:
         yield
     except FormatError:
         raise
-    except (KeyboardInterrupt, SystemExit, GeneratorExit):
+    except (MemoryError, KeyboardInterrupt, SystemExit, GeneratorExit):
         raise
     except BaseException as error:
         # A panic of lazrs (Rust) is a BaseException, which `except Exception` lets through; others of its kind pass.
@@ -79,9 +81,10 @@ def read(path: str | os.PathLike[str]) -> Cloud:
         head = file.read(512)
         if not head.startswith(b"LASF"):
             wrong_magic(name, "a LAS or LAZ file", head)
-        _check_records(name, head, size)
+        _check_records(name, file, head, size)
         file.seek(0)
-        with _foreign_errors(name, "reading LAS"), laspy.open(file, closefd=False) as reader:
+        backend: Any = CheckedLaz(name, size)  # laspy asks for its own type, and needs two methods of it
+        with _foreign_errors(name, "reading LAS"), laspy.open(file, closefd=False, laz_backend=backend) as reader:
             header = reader.header
             _check_size(name, header, size)
             columns = _read_columns(name, reader)
@@ -102,13 +105,21 @@ def read(path: str | os.PathLike[str]) -> Cloud:
     return Cloud(xyz, columns, crs=crs_of(header), metadata=metadata)
 
 
-def _check_records(path: str, head: bytes, size: int) -> None:
+def _check_records(path: str, file: BinaryIO, head: bytes, size: int) -> None:
     """Compare the promised records with the file's size: laspy would read billions of empty ones."""
-    records = [(100, 54)] + ([(243, 60)] if head[24:26] == b"\x01\x04" else [])
-    for position, length in records:
-        count = int.from_bytes(head[position : position + 4], "little")
+    num_extended = int.from_bytes(head[243:247], "little") if head[25:26] >= b"\x04" else 0
+    for count, length in ((int.from_bytes(head[100:104], "little"), 54), (num_extended, 60)):
         if count * length > size:
             raise FormatError(f"{path}: declared {count} header records, the file has {size} bytes; get the file again")
+    place, end = int.from_bytes(head[235:243], "little"), int.from_bytes(head[96:100], "little")
+    for _ in range(num_extended):
+        file.seek(min(place + 20, size))
+        place += 60 + int.from_bytes(file.read(8), "little")
+        end = max(end, place)
+        if end > size:
+            break
+    if end > size:
+        raise FormatError(f"{path}: declared records up to byte {end}, found {size}; get the file again")
 
 
 def _check_size(path: str, header: laspy.LasHeader, size: int) -> None:

@@ -14,6 +14,7 @@ from edgel.io.arrays import read_array
 from edgel.io.columns import find_xyz
 from edgel.io.errors import FormatError
 from edgel.io.files import reading, replacing, wrong_magic
+from edgel.io.limits import check_unpacked
 
 # A 2-D array of more columns than this is an image, not a table of points.
 _MAX_COLUMNS = 16
@@ -158,7 +159,7 @@ def read_npz(path: str | os.PathLike[str]) -> Cloud:
         raise FormatError(f"{name}: its arrays are {', '.join(arrays) or 'none'}; one called xyz or points is needed")
     try:
         return _assemble(_cloud_of(name, arrays.pop(key)), arrays)
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, OverflowError) as error:
         raise error if isinstance(error, FormatError) else FormatError(f"{name}: {error}") from None
 
 
@@ -166,12 +167,17 @@ def _read_members(path: str, file: IO[bytes]) -> dict[str, np.ndarray]:
     arrays = {}
     try:
         with zipfile.ZipFile(file) as archive:
-            for info in archive.infolist():
+            infos = archive.infolist()
+            # All members together: they may share their packed bytes.
+            check_unpacked(path, sum(info.file_size for info in infos), os.fstat(file.fileno()).st_size)
+            for info in infos:
+                if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+                    raise FormatError(f"{path} [{info.filename}]: packed in a way that NumPy does not; pack it anew")
                 if info.filename.endswith(".npy"):
                     size = min(info.file_size, (info.compress_size + 64) * _MAX_ZIP_RATIO)
                     with archive.open(info) as member:
                         arrays[info.filename[:-4]] = read_array(f"{path} [{info.filename}]", member, size)
-    except FormatError:
+    except (FormatError, MemoryError):
         raise
     except Exception as error:  # zipfile and zlib have a dozen errors for damage, none of them common to all
         raise FormatError(f"{path}: the .npz archive is damaged ({error}); get the file again") from None

@@ -12,6 +12,7 @@ from edgel.cloud import Cloud
 from edgel.io.columns import fits_float32, flat_attributes
 from edgel.io.errors import FormatError
 from edgel.io.files import reading, replacing
+from edgel.io.limits import check_unpacked
 from edgel.io.lzf import lzf_decompress
 from edgel.io.pcd_header import Header, read_header
 from edgel.io.rows import parse_text, read_binary, reject_row, remaining_bytes, write_binary
@@ -120,8 +121,9 @@ def _read_compressed(path: str, file: BinaryIO, header: Header) -> tuple[np.ndar
         raise FormatError(
             f"{path}: declared {header.count} points, the packed data holds {size} bytes; re-export the file"
         )
-    if packed_size > remaining_bytes(file) or size > packed_size * _MAX_LZF_RATIO:
-        found = remaining_bytes(file)
+    found = remaining_bytes(file)
+    check_unpacked(path, size, found)
+    if packed_size > found or size > packed_size * _MAX_LZF_RATIO:
         raise FormatError(
             f"{path}: declared {packed_size} packed bytes, found {found}; the file is cut off: get it again"
         )

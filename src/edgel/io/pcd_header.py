@@ -11,9 +11,12 @@ import numpy as np
 from edgel.io.columns import find_xyz
 from edgel.io.errors import FormatError
 from edgel.io.files import wrong_magic
+from edgel.io.limits import LONGEST_HEADER, whole_number
 from edgel.io.rows import number_of
 
 _TYPES = {"F": ("4", "8"), "I": ("1", "2", "4", "8"), "U": ("1", "2", "4", "8")}
+# Values of one point, all fields together: a histogram has hundreds.
+_MOST_VALUES = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -43,7 +46,9 @@ def read_header(path: str, file: BinaryIO) -> Header:
         if words and words[0].upper() in ("VERSION", "FIELDS", "COLUMNS", "SIZE", "TYPE", "COUNT", "WIDTH", "HEIGHT",
                                           "VIEWPOINT", "POINTS", "DATA"):  # fmt: skip
             entries[words[0].upper()] = words[1:]
-        elif words or not line or len(head) > 1 << 20:
+        elif words or not line:
+            break
+        if len(head) > LONGEST_HEADER:
             break
     if not re.match(rb"\s*(#\s*\.PCD|#|VERSION\s|FIELDS\s|COLUMNS\s)", head, re.IGNORECASE) or not entries:
         wrong_magic(path, "a PCD file (it has no PCD header)", head + file.read(512))
@@ -64,14 +69,17 @@ def _parse_header(path: str, entries: dict[str, list[str]], num_lines: int) -> H
         raise FormatError(f"{path}: the PCD fields are {' '.join(fields)}; x, y and z are needed")
     layout, padding = [], []
     for i, (field, size, kind, count) in enumerate(zip(fields, sizes, types, counts, strict=True)):
-        if size not in _TYPES.get(kind.upper(), ()) or not count.isdecimal() or not 0 < int(count) < 1 << 20:
+        number = whole_number(count) or 0
+        if size not in _TYPES.get(kind.upper(), ()) or not 0 < number <= _MOST_VALUES:
             raise FormatError(
                 f"{path}: PCD field {field!r} has TYPE {kind} SIZE {size} COUNT {count}; mend or re-export the file"
             )
         if field == "_":
             padding.append(f"_{i}")
-        shape = () if count == "1" else (int(count),)
+        shape = () if count == "1" else (number,)
         layout.append((f"_{i}" if field == "_" else field, "<" + kind.lower() + size, shape))
+    if sum(int(count) for count in counts) > _MOST_VALUES:
+        raise FormatError(f"{path}: PCD COUNT {' '.join(counts)[:60]}: more than {_MOST_VALUES} values a point")
     names = [name for name, _, _ in layout]
     if len(set(names)) < len(names) or any(shape for name, _, shape in layout if name in axes):
         raise FormatError(
@@ -94,10 +102,12 @@ def _extent(path: str, entries: dict[str, list[str]]) -> tuple[int, int, int]:
     numbers = {}
     for key in ("WIDTH", "HEIGHT", "POINTS"):
         words = entries.get(key)
-        if words is not None and (len(words) != 1 or not words[0].isdecimal()):
-            raise FormatError(f"{path}: PCD {key} is {' '.join(words)!r}; one whole number is needed")
-        if words:
-            numbers[key] = int(words[0])
+        if words is None:
+            continue
+        number = whole_number(words[0]) if len(words) == 1 else None
+        if number is None:
+            raise FormatError(f"{path}: PCD {key} is {' '.join(words)[:60]!r}; one whole number is needed")
+        numbers[key] = number
     if "WIDTH" not in numbers and "POINTS" not in numbers:
         raise FormatError(f"{path}: the PCD header has neither WIDTH nor POINTS; mend or re-export the file")
     height = numbers.get("HEIGHT", 1)

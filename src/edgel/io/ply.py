@@ -13,6 +13,7 @@ from edgel.cloud import Cloud
 from edgel.io.columns import find_xyz, fits_float32, flat_attributes, one_line
 from edgel.io.errors import FormatError
 from edgel.io.files import reading, replacing
+from edgel.io.limits import LONGEST_LINE, whole_number
 from edgel.io.ply_grid import range_grid, read_grid, spread
 from edgel.io.ply_header import NAMES, Element, Header, cut_off, read_header
 from edgel.io.ply_lists import gather, skip, walk
@@ -89,6 +90,8 @@ def _read_ascii(
     # CR alone ends lines too: universal newlines, as the header.
     text = TextIOWrapper(file, "utf-8", "replace", newline=None)
     num_skipped = sum(element.count for element in skipped)
+    if num_skipped > remaining_bytes(file):  # a row of nothing still takes a line
+        raise cut_off(path, vertex.count, 0)
     lines = islice((line for line in text if not line.isspace()), num_skipped, num_skipped + vertex.count)
     rows = list(lines)
     text.detach()
@@ -109,16 +112,19 @@ def _read_ascii(
 
 
 def _without_lists(path: str, row: str, vertex: Element) -> str:
+    if len(row) > LONGEST_LINE:
+        raise FormatError(f"{path}: vertex line {row[:60]!r} is {len(row)} characters long; mend the file")
     words = row.split()
     kept, position = [], 0
     for p in vertex.properties:
         length = 0
         if p.length_code is not None:
-            if position >= len(words) or not words[position].isdigit():
+            number = whole_number(words[position]) if position < len(words) else None
+            if number is None:
                 raise FormatError(
                     f"{path}: vertex line {row.strip()[:60]!r} breaks off in list {p.name!r}; mend the file"
                 )
-            length = int(words[position])
+            length = number
         else:
             kept.append(words[position] if position < len(words) else "")
         position += 1 + length

@@ -10,8 +10,11 @@ import numpy as np
 
 from edgel.cloud import Cloud
 from edgel.io.errors import FormatError
+from edgel.io.limits import check_unpacked, whole_number
 from edgel.io.ply_header import Header
 from edgel.io.ply_lists import gather, skip, walk
+
+_BAD = -2
 
 
 def range_grid(header: Header) -> tuple[int, tuple[int, int]] | None:
@@ -22,22 +25,27 @@ def range_grid(header: Header) -> tuple[int, tuple[int, int]] | None:
     position = names.index("range_grid", names.index("vertex"))
     grid = header.elements[position]
     lists = [p.length_code is not None for p in grid.properties]
-    return (position, header.shape) if grid.count == header.shape[0] * header.shape[1] and lists == [True] else None
+    whole = grid.count == header.shape[0] * header.shape[1] and lists == [True] and grid.properties[0].code[0] in "iu"
+    return (position, header.shape) if whole else None
 
 
 def read_grid(path: str, file: BinaryIO, header: Header, position: int) -> np.ndarray:
     """Read which vertex each cell of a range grid holds (-1: none)."""
-    grid = header.elements[position]
+    grid, after = header.elements[position], file.tell()
+    size = file.seek(0, 2)
+    # A cell takes a byte or two of the file, and all that a vertex has in memory.
+    check_unpacked(path, grid.count * (24 + header.elements[header.index("vertex")].min_row), size)
+    file.seek(after)
     if header.ascii:
         file.seek(header.size)
         lines = (line for line in file if not line.isspace())
         first = sum(element.count for element in header.elements[:position])
-        cells = [line.split() for line in islice(lines, first, first + grid.count)]
-        good = len(cells) == grid.count
-        good = good and all(cell == [b"0"] or (cell[0] == b"1" and len(cell) == 2) for cell in cells)
-        if not good or not all(cell[-1].isdigit() for cell in cells):
+        # A cell of its own line: what is promised beyond the file's bytes is not there.
+        cells = islice(lines, min(first, size), min(first + grid.count, size))
+        index = np.fromiter(map(_cell, cells), np.int64)
+        if len(index) != grid.count or (index == _BAD).any():
             raise FormatError(f"{path}: element range_grid is cut off, or a cell holds several points; get it again")
-        return np.array([int(cell[1]) if cell[0] == b"1" else -1 for cell in cells])
+        return index
     for element in header.elements[header.index("vertex") + 1 : position]:
         skip(path, file, header, element)
     data, offsets = walk(path, file, header, grid, keep=True)
@@ -47,6 +55,15 @@ def read_grid(path: str, file: BinaryIO, header: Header, position: int) -> np.nd
     starts = offsets[filled, 0] + length.itemsize
     index[filled] = gather(data, starts, np.dtype(header.order + grid.properties[0].code))
     return index
+
+
+def _cell(line: bytes) -> int:
+    """Return the vertex that a line of a grid names, -1 for none, _BAD for anything else."""
+    words = line.split() if len(line) < 64 else []
+    if words == [b"0"]:
+        return -1
+    number = whole_number(words[1].decode("utf-8", "replace")) if len(words) == 2 and words[0] == b"1" else None
+    return _BAD if number is None else number
 
 
 def spread(path: str, cloud: Cloud, index: np.ndarray, shape: tuple[int, int]) -> Cloud:

@@ -10,6 +10,7 @@ import numpy as np
 
 from edgel.io.errors import FormatError
 from edgel.io.files import wrong_magic
+from edgel.io.limits import LONGEST_HEADER, whole_number
 
 _TYPES = {
     "char": "i1",
@@ -25,6 +26,7 @@ NAMES = {code: name for name, code in _TYPES.items()}
 # The other spelling, and 64-bit integers, which the format does not have but some programs write.
 _TYPES |= {f"{kind}{8 * size}": f"{kind[0]}{size}" for kind in ("int", "uint") for size in (1, 2, 4, 8)}
 _TYPES |= {"float32": "f4", "float64": "f8"}
+_END = re.compile(rb"[\r\n]end_header[ \t]*(\r\n|\r|\n|$)")
 _BYTE_ORDER = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
 
 
@@ -70,8 +72,8 @@ class Header:
     @property
     def shape(self) -> tuple[int, int] | None:
         """Rows and columns that the obj_info lines give, None when they do not."""
-        rows, cols = self.info.get("num_rows", ""), self.info.get("num_cols", "")
-        return (int(rows), int(cols)) if rows.isdecimal() and cols.isdecimal() else None
+        rows, cols = (whole_number(self.info.get(key, "")) for key in ("num_rows", "num_cols"))
+        return None if rows is None or cols is None else (rows, cols)
 
 
 def read_header(path: str, file: BinaryIO) -> Header:
@@ -79,11 +81,13 @@ def read_header(path: str, file: BinaryIO) -> Header:
     head = file.read(1 << 16)
     if not re.match(rb"ply[ \t]*[\r\n]", head):
         wrong_magic(path, "a PLY file", head[:512])
-    while not (end := re.search(rb"[\r\n]end_header[ \t]*(\r\n|\r|\n|$)", head)):
-        more = file.read(1 << 16)
-        if not more or len(head) > 1 << 24:
-            raise FormatError(f"{path}: the PLY header has no end_header; the file is cut off or damaged: get it again")
-        head += more
+    if not (end := _END.search(head)):
+        head += file.read(LONGEST_HEADER)
+        if not (end := _END.search(head)):
+            raise FormatError(
+                f"{path}: no end_header in the first {len(head)} bytes of the PLY file; it is cut off or damaged: "
+                "get it again"
+            )
     # With lines that end in a bare CR, an LF after end_header is data already.
     bare_return = not head[: end.start()].count(b"\n")
     file.seek(end.end(1) - (bare_return and end.group(1) == b"\r\n"))
@@ -111,8 +115,8 @@ def _parse_header(path: str, lines: list[str], size: int) -> Header:
                 info[rest[0] if rest else ""] = line.strip().split(None, 2)[2] if len(rest) > 1 else ""
             case ["format", kind, _] if kind in _BYTE_ORDER:
                 order = kind
-            case ["element", name, count] if count.isascii() and count.isdigit():
-                elements.append(Element(name, int(count), []))
+            case ["element", name, word] if (count := whole_number(word)) is not None:
+                elements.append(Element(name, count, []))
             case ["property", "list", length, kind, name] if elements and kind in _TYPES and length in _TYPES:
                 elements[-1].properties.append(Property(name, _TYPES[kind], _TYPES[length]))
             case ["property", kind, name] if elements and kind in _TYPES:

@@ -10,6 +10,7 @@ from typing import BinaryIO
 import numpy as np
 
 from edgel.io.errors import FormatError
+from edgel.io.limits import LONGEST_LINE
 
 # Rows copied at a time: small enough that a chunk is still in the cache when its columns are taken out of it.
 CHUNK = 32768
@@ -123,6 +124,8 @@ def first_bad_line(
         text = line.split(comment)[0].strip() if comment else line.strip()
         if not text:
             continue
+        if len(text) > LONGEST_LINE:
+            return number, text[:60]
         tokens = [token.strip() for token in (text.split(delimiter) if delimiter else text.split())]
         if len(tokens) != width or not all(number_of(token) for token in tokens):
             return number, line.strip()[:60]

@@ -12,6 +12,7 @@ from edgel.cloud import Cloud
 from edgel.io.columns import find_xyz, flat_attributes, spell_out_colors
 from edgel.io.errors import FormatError
 from edgel.io.files import describe, reading, replacing
+from edgel.io.limits import LONGEST_LINE, whole_number
 from edgel.io.rows import first_bad_line, number_of, parse_text
 
 _DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?|[-+]?\d+")
@@ -19,6 +20,7 @@ _INTEGER = re.compile(r"[-+]?\d+")
 _COLORS = ["red", "green", "blue"]
 # Lines looked at to find out what the columns are.
 _SAMPLE = 200
+_MOST_COLUMNS = 4096
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,13 @@ def _decode(path: str, raw: bytes) -> list[str]:
         raise FormatError(f"{path}: not a text of points; the file seems to be {what}: {remedy}")
     else:
         text = raw.decode("utf-8-sig", "replace")
-    return text.splitlines()
+    lines = text.splitlines()
+    longest = max(lines, key=len, default="")
+    if len(longest) > LONGEST_LINE:
+        raise FormatError(
+            f"{path}: line {lines.index(longest) + 1} is {len(longest)} characters long; one point a line is needed"
+        )
+    return lines
 
 
 def _strip(line: str) -> str:
@@ -121,8 +129,9 @@ def _find_layout(path: str, lines: list[str]) -> _Layout:
         delimiter, comma = _separator(text)
         tokens = _split(text, delimiter)
         if all(number_of(token.replace(",", ".") if comma else token) for token in tokens):
-            if len(tokens) == 1 and _INTEGER.fullmatch(tokens[0]) and count is None and header_number == 0:
-                count, header_number = int(tokens[0]), number + 1
+            declared = whole_number(tokens[0].removeprefix("+")) if len(tokens) == 1 else None
+            if declared is not None and count is None and header_number == 0:
+                count, header_number = declared, number + 1
                 continue
             return _Layout(number, delimiter, comma, _header_names(path, header, len(tokens), number), count)
         if (header is not None and not header[1]) or not _is_header(tokens):
@@ -183,6 +192,11 @@ def _data_lines(lines: list[str], layout: _Layout) -> list[str]:
 def _parse(path: str, lines: list[str], data: list[str], layout: _Layout) -> dict[str, np.ndarray]:
     sample = [_split(line, layout.delimiter) for line in data[:_SAMPLE]]
     width = len(sample[0])
+    if width > _MOST_COLUMNS:
+        raise FormatError(
+            f"{path}: line {layout.first + 1} has {width} numbers; one point a line is needed, of {_MOST_COLUMNS} "
+            "numbers at most"
+        )
     if width < 3:
         raise FormatError(f"{path}: line {layout.first + 1} has {width} numbers; x, y and z are needed")
     whole = [all(len(row) == width and _INTEGER.fullmatch(row[i]) for row in sample) for i in range(width)]
