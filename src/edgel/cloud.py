@@ -200,14 +200,14 @@ def unmasked(values: Any, name: str) -> np.ndarray:
     ValueError
         If something is masked and the type has no NaN: texts, records, integers beyond 2^53.
     """
-    if isinstance(values, list | tuple) and any(map(np.ma.isMaskedArray, values)):
-        values = np.ma.array(values)
-    if not np.ma.is_masked(values):
-        return np.asarray(values)
-    numbers = values.astype(np.float64) if values.dtype.kind in "biu" else values
-    beyond = values.dtype.kind in "iu" and np.abs(numbers.compressed()).max(initial=0) > 2**53
+    several = isinstance(values, list | tuple) and any(map(np.ma.isMaskedArray, values))
+    masked: Any = np.ma.array(values) if several else values
+    if not np.ma.is_masked(masked):
+        return np.asarray(masked)
+    numbers = masked.astype(np.float64) if masked.dtype.kind in "biu" else masked
+    beyond = masked.dtype.kind in "iu" and np.abs(numbers.compressed()).max(initial=0) > 2**53
     if numbers.dtype.kind not in "fc" or beyond:
-        raise ValueError(f"{name}: some are masked, and {values.dtype} has no NaN for them; fill them (.filled(value))")
+        raise ValueError(f"{name}: some are masked, and {masked.dtype} has no NaN for them; fill them (.filled(value))")
     return numbers.filled(np.nan)
 
 
