@@ -236,9 +236,8 @@ def unmasked(values: Any, name: str) -> np.ndarray:
     ValueError
         If something is masked and the type has no NaN: texts, records, integers beyond 2^53.
     """
-    masked: Any = values
-    if isinstance(values, list | tuple) and any(map(np.ma.isMaskedArray, values)):
-        masked = np.ma.array(values)
+    several = isinstance(values, list | tuple) and any(map(np.ma.isMaskedArray, values))
+    masked: Any = np.ma.array(values) if several else values
     if not np.ma.is_masked(masked):
         return np.asarray(masked)
     numbers = masked.astype(np.float64) if masked.dtype.kind in "biu" else masked
