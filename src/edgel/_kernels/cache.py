@@ -89,7 +89,7 @@ class KernelCache(NullCache):
 
 
 def _ingredients(function: Callable[..., Any], seen: set[Any]) -> Iterator[str]:
-    """Yield all that is compiled into a function: the files of it and of the functions it calls, and their constants."""
+    """Yield all that is compiled into a function: its file, those of the functions it calls, and their constants."""
     if function in seen:
         return
     seen.add(function)
