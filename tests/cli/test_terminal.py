@@ -1,4 +1,4 @@
-"""What comes from outside is shown printable, whole where a program reads it, and short; streams may be closed or full."""
+"""What comes from outside is shown printable and short, and is exact in JSON; streams may be closed or full."""
 
 import json
 import os

@@ -7,6 +7,7 @@ import signal
 import sys
 import threading
 import time
+from contextlib import suppress
 from types import FrameType
 from typing import Any, NoReturn
 
@@ -31,10 +32,8 @@ def listen() -> None:
 def end_now(code: int) -> NoReturn:
     """End without waiting for threads, which may still compile kernels that nobody wants any more."""
     for stream in (sys.stdout, sys.stderr):
-        try:
+        with suppress(OSError):
             stream.flush()
-        except OSError:
-            pass
     os._exit(code)
 
 

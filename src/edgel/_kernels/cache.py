@@ -21,6 +21,7 @@ from typing import Any
 
 import numba
 import numpy as np
+from numba.core import config
 from numba.core.caching import CompileResultCacheImpl, NullCache
 from numba.core.serialize import dumps
 
@@ -58,12 +59,12 @@ class KernelCache(NullCache):
         except Exception:  # whatever unpickling raises, classes that have moved included
             return None
 
-    def save_overload(self, sig: Any, data: Any) -> None:
+    def save_overload(self, sig: Any, cres: Any) -> None:
         """Keep what was compiled, where it can be kept: it runs all the same."""
         try:
-            if self._numba.check_cachable(data):
-                compiled = dumps(self._numba.reduce(data))
-                _write(self._path(sig, data.codegen), self._head(compiled) + compiled)
+            if self._numba.check_cachable(cres):
+                compiled = dumps(self._numba.reduce(cres))
+                _write(self._path(sig, cres.codegen), self._head(compiled) + compiled)
         except Exception:
             KernelCache.keeps = False
 
@@ -74,7 +75,7 @@ class KernelCache(NullCache):
     @cached_property
     def _stamp(self) -> bytes:
         ingredients = sorted(set(_ingredients(self._function, set())))
-        checked = f"bounds checked: {bool(numba.config.BOUNDSCHECK)}"  # pyright: ignore[reportAttributeAccessIssue]
+        checked = f"bounds checked: {bool(config.BOUNDSCHECK)}"  # pyright: ignore[reportAttributeAccessIssue]
         return _HASH("\0".join([numba.__version__, checked, *ingredients]).encode()).digest()
 
     def _head(self, compiled: bytes) -> bytes:

@@ -53,7 +53,7 @@ class Guard:
 
     @contextmanager
     def at_the_door(self) -> Iterator[None]:
-        """Have every server that websockets starts meanwhile ask this guard first, and keep its clients' faults quiet."""
+        """Have each server that websockets starts meanwhile ask this guard first, and keep its clients' faults quiet."""
         original = websockets.asyncio.server.serve
 
         def serve(*args: Any, process_request: Callable[..., Any], **options: Any) -> Any:
@@ -79,13 +79,14 @@ def _place(address: str) -> tuple[str, int | None] | None:
     """Return the host and the port of an address, None where there are none."""
     try:
         parts = urlsplit(address)
-        return (parts.hostname, parts.port) if parts.hostname and parts.username is None else None
+        host, port = parts.hostname, parts.port
     except ValueError:
         return None
+    return (host, port) if host and parts.username is None else None
 
 
 def _kept_to_itself(answer: Response) -> Response:
-    """Keep the address, and the token in it, from other places that the page may lead to, and the page out of frames."""
+    """Keep the address, and the token in it, from wherever the page may lead, and the page out of frames."""
     answer.headers["Referrer-Policy"] = "no-referrer"
     answer.headers["X-Frame-Options"] = "DENY"
     return answer

@@ -33,7 +33,7 @@ def printable(text: object, longest: int = LONGEST) -> str:
 class FormatError(ValueError):
     """A file that cannot be read, or a cloud that a format cannot hold.
 
-    The message names the file, what was found in it, and what to do; it is short, and printable whatever is in the file.
+    The message names the file, what was found in it, and what to do; it is short and printable, whatever is in it.
 
     Examples
     --------
