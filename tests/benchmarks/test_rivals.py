@@ -114,7 +114,9 @@ def test_finds_most_of_an_easy_edge(rival):
         assert found.kind.dtype == np.uint8
         assert not found.mask[np.isnan(cloud.xyz[:, 0])].any()
         assert np.array_equal(found.mask, found.kind != 0)
-        assert found.seconds > 0  # the first run compiles, and machines are shared: how fast is for the benchmark to say
+        assert (
+            found.seconds > 0
+        )  # the first run compiles, and machines are shared: how fast is for the benchmark to say
         best = max(best, f1(cloud, found.mask, kind, rival.finds))
         if best > 0.9:
             break

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 import edgel
 from edgel import io
 from edgel._cli import app
-from edgel._cli.convert import differences
+from edgel._cli.compare import differences
 from edgel._cli.detect import detect
 from edgel._cli.methods import arguments
 from edgel._cli.options import METHODS

@@ -27,7 +27,7 @@ INTEGERS = [
 ]
 
 
-def _flip(rng: random.Random, raw: bytearray, _: bytes) -> None:
+def _flip(rng: random.Random, raw: bytearray, other: bytes) -> None:
     for _ in range(rng.choice((1, 1, 2, 8))):
         raw[_place(rng, raw)] ^= 1 << rng.randrange(8)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import laspy
 import numpy as np
+from laspy.vlrs.vlrlist import VLRList
 from PIL import Image
 
 from edgel import Cloud
@@ -92,7 +93,7 @@ def _las(version: str, point_format: int, *, packed: bool, extended: bool = Fals
     las = laspy.LasData(header)
     las.xyz = np.random.default_rng(point_format).normal(size=(40, 3)) * 10
     if extended:
-        las.evlrs = laspy.vlrs.vlrlist.VLRList([laspy.VLR("someone", 7, "a note", b"some bytes")])
+        las.evlrs = VLRList([laspy.VLR("someone", 7, "a note", b"some bytes")])
     file = io.BytesIO()
     las.write(file, do_compress=packed)
     return file.getvalue()

@@ -15,6 +15,7 @@ from contextlib import suppress
 import laspy
 import numpy as np
 import pytest
+from laspy.vlrs.vlrlist import VLRList
 from PIL import Image
 
 from edgel import Cloud
@@ -166,7 +167,7 @@ def test_las_extended_records(tmp_path):
     header = laspy.LasHeader(version="1.4", point_format=6)
     las = laspy.LasData(header)
     las.xyz = np.eye(3)
-    las.evlrs = laspy.vlrs.vlrlist.VLRList([laspy.VLR("someone", 7, "a note", b"some bytes")])
+    las.evlrs = VLRList([laspy.VLR("someone", 7, "a note", b"some bytes")])
     las.write(str(tmp_path / "a.las"))
     raw = bytearray((tmp_path / "a.las").read_bytes())
     place = int.from_bytes(raw[235:243], "little")

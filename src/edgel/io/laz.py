@@ -6,12 +6,14 @@ import struct
 from typing import Any, BinaryIO
 
 import laspy
-import lazrs
+import lazrs as _lazrs
 import numpy as np
 
 from edgel.io.errors import FormatError
 from edgel.io.limits import check_unpacked
 from edgel.io.quiet import quiet_decoder
+
+lazrs: Any = _lazrs  # it has no types
 
 _CHUNKED, _LAYERED = 2, 3
 # Versions of items that go with a compressor.
