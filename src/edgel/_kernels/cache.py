@@ -58,12 +58,12 @@ class KernelCache(NullCache):
         except Exception:  # whatever unpickling raises, classes that have moved included
             return None
 
-    def save_overload(self, sig: Any, data: Any) -> None:
+    def save_overload(self, sig: Any, cres: Any) -> None:
         """Keep what was compiled, where it can be kept: it runs all the same."""
         try:
-            if self._numba.check_cachable(data):
-                compiled = dumps(self._numba.reduce(data))
-                _write(self._path(sig, data.codegen), self._head(compiled) + compiled)
+            if self._numba.check_cachable(cres):
+                compiled = dumps(self._numba.reduce(cres))
+                _write(self._path(sig, cres.codegen), self._head(compiled) + compiled)
         except Exception:
             KernelCache.keeps = False
 

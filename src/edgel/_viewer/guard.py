@@ -53,7 +53,7 @@ class Guard:
 
     @contextmanager
     def at_the_door(self) -> Iterator[None]:
-        """Have each server that websockets starts meanwhile ask this guard first, and keep its clients' faults quiet."""
+        """Have each server that websockets starts meanwhile ask this guard first, and keep quiet of odd clients."""
         original = websockets.asyncio.server.serve
 
         def serve(*args: Any, process_request: Callable[..., Any], **options: Any) -> Any:
