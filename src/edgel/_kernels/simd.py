@@ -107,13 +107,8 @@ _operator(operator.mul, floats, floats, lambda builder, a, b: builder.fmul(a, b)
 _operator(operator.truediv, floats, floats, lambda builder, a, b: builder.fdiv(a, b))
 _operator(operator.and_, flags, flags, lambda builder, a, b: builder.and_(a, b))
 _operator(operator.or_, flags, flags, lambda builder, a, b: builder.or_(a, b))
-for _sign, _compare in (
-    ("<", operator.lt),
-    ("<=", operator.le),
-    (">", operator.gt),
-    (">=", operator.ge),
-    ("==", operator.eq),
-):
+_COMPARISONS = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge, "==": operator.eq}
+for _sign, _compare in _COMPARISONS.items():
     _operator(_compare, flags, floats, lambda builder, a, b, sign=_sign: builder.fcmp_ordered(sign, a, b))
     _operator(_compare, flags, counts, lambda builder, a, b, sign=_sign: builder.icmp_signed(sign, a, b))
 

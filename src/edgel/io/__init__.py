@@ -13,7 +13,7 @@ from typing import Any, BinaryIO, NoReturn
 import numpy as np
 
 from edgel.cloud import Cloud
-from edgel.io import depth, e57, e57_write, npy, pcd, ply, text
+from edgel.io import depth, e57, e57_write, npy, pcd, ply, text, text_write
 from edgel.io.depth import Intrinsics, read_intrinsics
 from edgel.io.errors import FormatError, printable
 from edgel.io.files import check_readable, describe
@@ -54,7 +54,7 @@ WRITERS: dict[str, Callable[[Any, Cloud], None]] = {
     ".pcd": pcd.write,
     ".las": _write_las,
     ".laz": _write_las,
-    **dict.fromkeys(_TEXT, text.write),
+    **dict.fromkeys(_TEXT, text_write.write),
     ".npy": npy.write_npy,
     ".npz": npy.write_npz,
     ".e57": e57_write.write,

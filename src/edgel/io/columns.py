@@ -11,7 +11,8 @@ import numpy as np
 from edgel.cloud import Cloud
 from edgel.io.errors import FormatError
 
-_SHORT_COLORS = {"r": "red", "g": "green", "b": "blue"}
+COLORS = ["red", "green", "blue"]
+_SHORT_COLORS = dict(zip("rgb", COLORS, strict=True))
 
 
 def flat_attributes(cloud: Cloud, path: object, *, keep_arrays: bool = False) -> dict[str, np.ndarray]:

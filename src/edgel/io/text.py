@@ -9,15 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from edgel.cloud import Cloud
-from edgel.io.columns import find_xyz, flat_attributes, spell_out_colors
+from edgel.io.columns import COLORS, find_xyz, spell_out_colors
 from edgel.io.errors import FormatError
-from edgel.io.files import describe, reading, replacing
+from edgel.io.files import describe, reading
 from edgel.io.limits import LONGEST_LINE, whole_number
 from edgel.io.rows import first_bad_line, number_of, parse_text
 
 _DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?|[-+]?\d+")
 _INTEGER = re.compile(r"[-+]?\d+")
-_COLORS = ["red", "green", "blue"]
 # Lines looked at to find out what the columns are.
 _SAMPLE = 200
 _MOST_COLUMNS = 4096
@@ -229,7 +228,7 @@ def _guess_names(columns: list[np.ndarray]) -> list[str]:
     names = {0: "x", 1: "y", 2: "z"} | {i: f"column_{i}" for i in rest}
     last = rest[-3:]
     if len(last) == 3 and all(_is_byte(columns[i]) for i in last):
-        names.update(zip(last, _COLORS, strict=True))
+        names.update(zip(last, COLORS, strict=True))
         rest = rest[:-3]
     if len(rest) == 1:
         names[rest[0]] = "intensity"
@@ -242,60 +241,6 @@ def _is_byte(values: np.ndarray) -> bool:
 
 def _bytes_of_colors(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Give colours of 0..255 the type that they have in the other formats."""
-    if all(name in columns and len(columns[name]) and _is_byte(columns[name]) for name in _COLORS):
-        columns.update({name: columns[name].astype(np.uint8) for name in _COLORS})
+    if all(name in columns and len(columns[name]) and _is_byte(columns[name]) for name in COLORS):
+        columns.update({name: columns[name].astype(np.uint8) for name in COLORS})
     return columns
-
-
-def write(path: str | os.PathLike[str], cloud: Cloud) -> None:
-    r"""Write a text of points: a header line, then one point a line, in the shortest digits that read back exactly.
-
-    ``.csv`` is separated by commas, everything else by blanks. ``.pts`` begins with the number of points, and has its
-    column names in a comment when they are not the usual ``x y z [intensity] [red green blue]``. (N, C) attributes
-    become ``name_0 .. name_{C-1}``; types, organized shape, viewpoint and CRS are not kept, text has no place for them.
-
-    Parameters
-    ----------
-    path : path
-    cloud : Cloud
-
-    Raises
-    ------
-    FormatError
-        If an attribute is not numeric.
-    OSError
-        If the file cannot be written.
-
-    Examples
-    --------
-    >>> import tempfile, pathlib, numpy as np
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = pathlib.Path(folder, "a.xyz")
-    ...     write(file, Cloud([[0.1, 2, 3]], {"label": np.array([7])}))
-    ...     file.read_text()
-    'x y z label\n0.1 2.0 3.0 7\n'
-    """
-    suffix = os.path.splitext(path)[1].lower()
-    separator = "," if suffix == ".csv" else " "
-    columns = dict(zip("xyz", cloud.xyz.T, strict=True))
-    for name, values in flat_attributes(cloud, path).items():
-        word = re.sub(r"[,;#/\"']", "_", name)
-        if word in columns:
-            raise FormatError(f"{os.fspath(path)}: two columns would be called {word!r}; rename attribute {name!r}")
-        columns[word] = values
-    header = separator.join(columns) + "\n"
-    if suffix == ".pts":
-        usual = list(columns)[3:] in ([], ["intensity"], _COLORS, ["intensity", *_COLORS])
-        header = f"{len(cloud)}\n" + ("" if usual else f"# {header}")
-    with replacing(path) as file:
-        file.write(header.encode())
-        for start in range(0, len(cloud), 65536):
-            words = [_words(values[start : start + 65536]) for values in columns.values()]
-            file.write("\n".join([*map(separator.join, zip(*words, strict=True)), ""]).encode())
-
-
-def _words(values: np.ndarray) -> list[str]:
-    if values.dtype.kind == "b":
-        values = values.astype(np.uint8)
-    # Python's own numbers: their repr is the shortest text that gives the same double again.
-    return list(map(repr, values.astype(np.float64).tolist() if values.dtype.kind == "f" else values.tolist()))
