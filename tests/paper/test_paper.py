@@ -280,3 +280,18 @@ def test_edge_points_keep_every_attribute():
     np.testing.assert_array_equal(np.flatnonzero(labelled.attributes["edge_kind"]), found.index)
     np.testing.assert_allclose(labelled.attributes["nx"][found.index], found.normals[:, 0, 0], atol=1e-7)
     assert np.isnan(np.delete(labelled.attributes["nx"], found.index)).all()
+
+
+@pytest.mark.parametrize("size", [{}, {"width": 64, "height": 64}])
+@pytest.mark.parametrize(
+    "extents", [(2.8e29, 1.5e-19), (1e-120, 1e-153), (6e-154, 1e-320), (1e-320, 1.0), (1e30, 1e30)]
+)
+def test_extents_of_any_size_are_answered_or_refused(extents, size):
+    """The cast of what lies beyond int64 is anything: it must not become an index."""
+    points = np.random.default_rng(0).random((40, 3)) * [*extents, 1.0]
+    if not size and extents[0] != extents[1]:
+        with pytest.raises(ValueError, match="smaller size"):
+            paper.detect(points)
+        return
+    found = paper.detect(points, **size)
+    assert ((found.index >= 0) & (found.index < 40)).all()

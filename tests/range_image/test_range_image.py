@@ -4,6 +4,7 @@ import naive
 import numpy as np
 import pytest
 
+import edgel
 from edgel import Cloud
 from edgel._range_image.range_image import _nearest, image_pitch, organized, orthographic, pinhole, spherical
 from edgel.cloud import check_points
@@ -130,3 +131,22 @@ def test_far_from_the_origin_the_image_is_the_same():
     near, far = orthographic(xyz, DOWN), orthographic(xyz + (512_000, 4_096_000, 0), DOWN)
     assert far.pitch == pytest.approx(near.pitch, rel=0.01)
     assert far.shape == pytest.approx(near.shape, abs=1)
+
+
+def test_a_grid_whose_points_lie_mostly_in_one_place_has_a_pitch():
+    xyz = camera()
+    xyz[:, :30] = xyz[3, 3]
+    cloud = Cloud(xyz)
+    checked = check_points(cloud)
+    assert min(organized(checked.xyz, checked.rows, (40, 50)).pitch) > 0
+    assert edgel.detect(cloud).num_points == 2000
+
+
+def test_points_in_the_viewpoint_itself_do_not_show():
+    xyz = camera()
+    xyz[5:9, 7:12] = 0.0
+    checked = check_points(Cloud(xyz))
+    image = organized(checked.xyz, checked.rows, (40, 50))
+    assert (image.index[5:9, 7:12] == -1).all()
+    assert np.isnan(image.depth[5:9, 7:12]).all()
+    assert edgel.detect(xyz).num_points == 2000

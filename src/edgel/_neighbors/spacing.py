@@ -19,6 +19,7 @@ from edgel._neighbors.queries import at_places
 from edgel.cloud import check_points
 
 _SAMPLE = 20_000  # points whose nearest neighbours are looked for
+_CELLS = 2**24  # along an axis, at most, unless there are more points
 _PER_CELL = 8  # points in a cell, so that covered area is counted well
 
 
@@ -54,7 +55,9 @@ def occupied_spacing(xyz: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> f
     corners of the points' bounding box.
     """
     extent = upper[:2] - lower[:2]
+    # Of a cloud that is all but a line, the cells along it would be more than memory holds.
     cell = float(np.sqrt(_PER_CELL * extent[0] * extent[1] / len(xyz)))
+    cell = max(cell, float(extent.max()) / max(len(xyz), _CELLS))
     width, height = (max(int(np.ceil(length / cell)), 1) for length in extent)
     occupied = np.zeros(width * height, np.bool_)
     run_slices(_occupied, len(xyz), xyz, lower, upper, width, height, occupied, size=65536)

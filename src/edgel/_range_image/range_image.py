@@ -15,6 +15,7 @@ from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import knn
 from edgel._neighbors.queries import at_places
 from edgel._neighbors.spacing import covered_area
+from edgel._range_image.grid_steps import neighbours, parallel_direction, pitch_of, unevenness
 
 FRAME = 4  # empty pixels around a projection, so that the cloud's rim lies beside a void
 _SAMPLE = 2000  # points at which the evenness of the image is looked at
@@ -90,23 +91,27 @@ def organized(
     index = index.reshape(shape)
     eye = np.zeros(3) if viewpoint is None else viewpoint
     depth = np.linalg.norm(xyz - eye, axis=1)
-    pairs = _neighbours(index)
+    pairs = neighbours(index)
     with np.errstate(divide="ignore", invalid="ignore"):
         rays = (xyz - eye) / depth[:, None]
     from_eye = [np.linalg.norm(rays[b] - rays[a], axis=1) for a, b in pairs]
-    direction = _parallel(xyz, pairs)
+    from_eye = [step[np.isfinite(step)] for step in from_eye]  # points in the eye itself have no ray
+    direction = parallel_direction(xyz, pairs)
     across = xyz - (xyz @ direction)[:, None] * direction
     parallel = [np.linalg.norm(across[b] - across[a], axis=1) for a, b in pairs]
     middle = rays[depth > 0].mean(axis=0) if (depth > 0).any() else np.array([0.0, 0.0, 1.0])
-    if _unevenness(parallel) < _unevenness(from_eye):
+    if unevenness(parallel) < unevenness(from_eye):
         facing = direction @ (middle if viewpoint is not None or direction[2] == 0 else -direction * direction[2])
         direction = -direction if facing < 0 else direction
         depth, steps, eye, middle = xyz @ direction, parallel, None, direction
     else:
         steps = from_eye
+    if eye is not None:  # what lies in the viewpoint itself does not show: sensors report shots without an echo so
+        index.ravel()[rows[depth == 0]] = -1
+        depth = np.where(depth > 0, depth, np.nan)
     image = np.full(shape, np.nan)
     image.ravel()[rows] = depth
-    pitch = [float(np.median(step)) if len(step) else 1.0 for step in steps]
+    pitch = [pitch_of(step) for step in steps]
     return RangeImage(image, index, "organized", (pitch[0], pitch[1]), eye, _unit(middle), np.zeros(len(xyz)))
 
 
@@ -260,39 +265,3 @@ def _nearest(pixels, depth, xyz, index):
 
 def _unit(vector: np.ndarray) -> np.ndarray:
     return vector / np.linalg.norm(vector)
-
-
-def _neighbours(index: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Pairs of points one below the other, and side by side."""
-    pairs = []
-    for a, b in ((index[:-1], index[1:]), (index[:, :-1], index[:, 1:])):
-        both = (a >= 0) & (b >= 0)
-        pairs.append((a[both], b[both]))
-    return pairs
-
-
-def _parallel(xyz: np.ndarray, pairs: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """Direction along which alone the steps between neighbours differ, as they do where the rays are parallel."""
-    scatter = np.zeros((3, 3))
-    middles = []
-    for a, b in pairs:
-        step = xyz[b] - xyz[a]
-        middles.append(np.median(step, axis=0) if len(step) else np.zeros(3))
-        step = step - middles[-1]
-        scatter += step.T @ step
-    values, vectors = np.linalg.eigh(scatter)
-    across = np.cross(*middles)
-    length = np.linalg.norm(across)
-    count = sum(len(a) for a, _ in pairs)
-    if values[-1] <= 1e-12 * count * length and length > 0:  # one plane: any direction would do
-        return across / length
-    return vectors[:, -1]
-
-
-def _unevenness(steps: list[np.ndarray]) -> float:
-    """Median deviation of the steps from their median, relative to it, the larger of both directions."""
-    worst = 0.0
-    for step in steps:
-        middle = np.median(step) if len(step) else 0.0
-        worst = max(worst, float(np.median(np.abs(step - middle)) / middle) if middle > 0 else np.inf)
-    return worst

@@ -225,12 +225,14 @@ def choose_grid(xyz: np.ndarray, width: int | None, height: int | None) -> Pixel
         pixel = extent[1] / height
     else:
         pixel = PIXEL_SPACINGS * occupied_spacing(xyz, lower, upper)
-    columns = width or max(round(extent[0] / pixel), 1)
-    rows = height or max(round(extent[1] / pixel), 1)
-    if columns * rows > _MAX_PIXELS:
+    with np.errstate(divide="ignore", over="ignore"):  # extents of some 1e-320
+        columns, rows = width or max(extent[0] / pixel, 1.0), height or max(extent[1] / pixel, 1.0)
+    if not columns * rows <= _MAX_PIXELS:
         raise ValueError(
-            f"width, height: an image of {columns} x {rows} pixels is larger than {_MAX_PIXELS:,}; give a smaller size"
+            f"width, height: an image of {columns:.6g} x {rows:.6g} pixels is larger than {_MAX_PIXELS:,}; give a "
+            "smaller size"
         )
+    columns, rows = round(columns), round(rows)
     return PixelGrid(int(columns), int(rows), lower, upper, frame=1)
 
 

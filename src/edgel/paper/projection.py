@@ -231,10 +231,19 @@ def _highest(start, stop, size, xyz, lower, upper, width, height, images):
 
 
 @part
+def _clamped(number, most):
+    """Return a number as a whole one from 0 to `most`, 0 where it is none: beyond int64 the cast would be anything."""
+    if not number > 0.0:
+        return 0
+    return int(number) if number < most else most
+
+
+@part
 def _window(value, corners, scale, tolerance):
     """First and one past the last of the pixels of an axis whose corner is nearer than the tolerance."""
-    first = max(int((value - tolerance - corners[0]) * scale), 0)
-    last = min(int((value + tolerance - corners[0]) * scale) + 1, len(corners) - 1)
+    end = len(corners) - 1
+    first = _clamped((value - tolerance - corners[0]) * scale, end)
+    last = min(_clamped((value + tolerance - corners[0]) * scale, end) + 1, end)
     # The product only guesses; whether a corner counts is decided by the very comparison of Code 1.
     while first <= last and not abs(value - corners[first]) < tolerance:
         first += 1
