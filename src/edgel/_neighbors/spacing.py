@@ -56,7 +56,7 @@ def occupied_spacing(xyz: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> f
     """
     extent = upper[:2] - lower[:2]
     # Of a cloud that is all but a line, the cells along it would be more than memory holds.
-    cell = float(np.sqrt(_PER_CELL * extent[0] * extent[1] / len(xyz)))
+    cell = float(np.sqrt(_PER_CELL / len(xyz)) * np.sqrt(extent).prod())  # a product of extents may be below 1e-308
     cell = max(cell, float(extent.max()) / max(len(xyz), _CELLS))
     width, height = (max(int(np.ceil(length / cell)), 1) for length in extent)
     occupied = np.zeros(width * height, np.bool_)
