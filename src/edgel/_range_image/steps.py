@@ -1,0 +1,255 @@
+"""Steps in depth and rims: the near and the far side of every step, and where the surface ends against nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from edgel._kernels.hysteresis import levels
+from edgel._kernels.parallel import kernel, part, run_slices
+from edgel._range_image.facet_fits import Facets
+from edgel._range_image.rays import Rays
+
+STEP = 2.0  # spacings: least break of the surface between two pixels
+GAP = 2.0  # spacings: least difference of their depths
+LEAST = 0.5  # spacings between neighbours: what is less is not looked at
+SMEAR = 2  # pixels to either side over which a sensor may smear a step
+SURE = 6.2  # standard deviations by which a break exceeds what noise explains
+WEAK = 2 / 3  # of all that, where a break continues a sure one
+CHAIN = 8  # pixels: chains of both sides that are shorter are specks
+SHEER = 4.0, 4  # times all that, and pixels: steps so high need no longer chain
+BRIDGE = 2  # pixels: a hole no wider is bridged; where it slants, it may be BRIDGED wide along rows or columns
+BRIDGED = 5
+APART = 2.0  # times the pitch along lines, from which lines lie far apart
+NEARBY = 2  # cells within which the window of a pixel's own side lies
+_SPREAD = 0.7, 1.0364  # quantile of chance that tells its spread, and the normal distribution's: chance has long tails
+_SAMPLES = 1500  # places at which chance is looked at
+_BAND = 16  # rows
+
+
+def find_steps(rays: Rays, facets: Facets, void: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Find the steps in depth of a range image with voids (H, W).
+
+    Each pixel beside a gap is given the plane of its own side: of the windows around it the one that the surface fills
+    best. Where the planes of two neighbours (of 4, a hole of up to `BRIDGE` pixels between them) leave a step that
+    neither plane's slope explains, the near pixel is OCCLUDING and the far one OCCLUDED.
+
+    Returns
+    -------
+    (H, W) float64
+        Highest threshold, in multiples of what is likely, at which hysteresis keeps the pixel; 0 where none does.
+    (H, W) uint8
+        `EdgeKind` flag of the side that the pixel lies on.
+    """
+    shape = rays.near.shape
+    step, side = np.zeros(shape, np.float32), np.zeros(shape, np.uint8)
+    sure = SURE * _chance(rays, facets)
+    bridged = [int(BRIDGED * min(rays.pitch) / rays.pitch[1 - way] + 0.5) for way in (0, 1)]
+    for way in (0, 1):  # a pixel belongs to pairs of two rows: bands of the second way are columns
+        run_slices(
+            _steps, shape[way], way, rays.near, rays.ray, facets.plane[0], facets.noise, facets.cell,
+            max(rays.side, rays.pitch[1 - way]), rays.central, sure, void, bridged[way], step, side, size=_BAND,
+        )  # fmt: skip
+    step = step.astype(np.float64)
+    level = levels(step, WEAK, CHAIN)
+    sheer = levels(step / SHEER[0], WEAK, SHEER[1])
+    return np.fmax(level, sheer), side
+
+
+def _chance(rays: Rays, facets: Facets) -> float:
+    """Spread of the step between the planes of pixels 2 `SMEAR` + 1 apart over their noise, over the whole view."""
+    height, width = rays.near.shape
+    stride = max(int(np.sqrt(height * width / _SAMPLES)), 1)
+    places = np.array([(r, c) for r in range(stride // 2, height, stride) for c in range(stride // 2, width, stride)])
+    values = np.full((len(places), 2), np.nan, np.float32)
+    run_slices(
+        _sample, len(places), places, rays.near, rays.ray, facets.plane[0], facets.noise, facets.cell, values, size=128
+    )
+    known = values[np.isfinite(values)]
+    return max(float(np.quantile(known, _SPREAD[0])) / _SPREAD[1], 1.0) if len(known) else 1.0
+
+
+@kernel
+def _sample(start, stop, places, near, ray, plane, noise, cell, values):
+    height, width = near.shape
+    for n in range(start, stop):
+        row, col = places[n]
+        if near[row, col] != near[row, col]:
+            continue
+        for way in range(2):
+            r, c = (row, col + 2 * SMEAR + 1) if way == 0 else (row + 2 * SMEAR + 1, col)
+            if r >= height or c >= width or near[r, c] != near[r, c]:
+                continue
+            i, j, _ = _own_plane(row, col, near, ray, plane, cell)
+            a, b, _ = _own_plane(r, c, near, ray, plane, cell)
+            if i < 0 or a < 0:
+                continue
+            step = 0.0
+            for k in range(3):
+                step += (plane[a, b, k] - plane[i, j, k]) * ray[row, col, k]
+            left = max(plane[i, j, 3], plane[a, b, 3], noise[row // cell[0], col // cell[1]])
+            values[n, way] = abs(step) / left
+
+
+@part
+def _own_plane(row, col, near, ray, plane, cell):
+    """Cell of the window that fits a pixel's own side best, and the plane's misfit there and in all, squared."""
+    i, j = row // cell[0], col // cell[1]
+    best, where_i, where_j = np.inf, -1, -1
+    for a in range(max(i - NEARBY, 0), min(i + NEARBY + 1, plane.shape[0])):
+        for b in range(max(j - NEARBY, 0), min(j + NEARBY + 1, plane.shape[1])):
+            left = plane[a, b, 3]
+            if left == np.inf:
+                continue
+            off = near[row, col]
+            for k in range(3):
+                off -= plane[a, b, k] * ray[row, col, k]
+            apart = (a - i) * (a - i) + (b - j) * (b - j)
+            # The farther the window, the farther its plane is extended.
+            value = left * left * (1.0 + 0.1 * apart) + off * off / 4
+            if value < best:
+                best, where_i, where_j = value, a, b
+    return where_i, where_j, best
+
+
+@part
+def _leap(row, col, r, c, dr, dc, near, ray, plane, noise, cell):
+    """Step that neither side's slope explains, and its noise."""
+    height, width = near.shape
+    gap = near[r, c] - near[row, col]
+    sigma = noise[row // cell[0], col // cell[1]]
+    i, j, misfit = _own_plane(row, col, near, ray, plane, cell)
+    a, b, other = _own_plane(r, c, near, ray, plane, cell)
+    limit = 16 * sigma * sigma
+    if i >= 0 and a >= 0 and misfit < limit and other < limit:
+        here = there = 0.0
+        for k in range(3):
+            differs = plane[a, b, k] - plane[i, j, k]
+            here += differs * ray[row, col, k]
+            there += differs * ray[r, c, k]
+        # Seen from either pixel: planes that merely cross between the two, at a fold, are no step.
+        if here * gap <= 0 or there * gap <= 0:
+            return 0.0, 1.0
+        left = max(plane[i, j, 3], plane[a, b, 3], sigma)
+        return min(abs(here), abs(there)), left
+    # Too thin for a window: the pixels behind either one tell the slope.
+    leap = abs(gap)
+    for s in range(2):
+        p, q = (row - dr, col - dc) if s == 0 else (r + dr, c + dc)
+        if p < 0 or q < 0 or p >= height or q >= width:
+            continue
+        slope = (near[row, col] - near[p, q]) if s == 0 else (near[p, q] - near[r, c])
+        if slope == slope and slope * gap > 0:
+            leap = min(leap, abs(gap) - abs(slope))
+    return max(leap, 0.0) / 2, sigma
+
+
+@kernel
+def _steps(start, stop, way, near, ray, plane, noise, cell, unit, central, sure, void, bridged, step, side):
+    height, width = near.shape
+    dr, dc = (0, 1) if way == 0 else (1, 0)
+    rows = (start, stop) if way == 0 else (0, height)
+    cols = (0, width) if way == 0 else (start, stop)
+    for row in range(rows[0], rows[1]):
+        for col in range(cols[0], cols[1]):
+            own = near[row, col]
+            if own != own:
+                continue
+            r, c = row + dr, col + dc
+            for _ in range(bridged):
+                if r < height and c < width and near[r, c] != near[r, c] and not void[r, c]:
+                    r, c = r + dr, c + dc
+            if r >= height or c >= width or near[r, c] != near[r, c]:
+                continue
+            gap = near[r, c] - own
+            spacing = unit * max(own, near[r, c]) if central else unit
+            if not abs(gap) > LEAST * spacing or not _steepest(row, col, r, c, dr, dc, gap, near):
+                continue
+            sigma = noise[row // cell[0], col // cell[1]]
+            value = 0.0
+            for apart in range(min(SMEAR, bridged) + 1):
+                p, q, u, v = row - apart * dr, col - apart * dc, r + apart * dr, c + apart * dc
+                if p < 0 or q < 0 or u >= height or v >= width:
+                    break
+                whole = (near[u, v] - near[p, q]) * (1.0 if gap > 0 else -1.0)
+                if not whole > max(GAP * spacing, sure * sigma / 2):  # NaN too
+                    continue
+                leap, left = _leap(p, q, u, v, dr, dc, near, ray, plane, noise, cell)
+                value = max(value, min(leap / max(STEP * spacing, sure * left), whole / (GAP * spacing)))
+            if value > step[row, col]:
+                step[row, col], side[row, col] = value, 4 if gap > 0 else 2
+            if value > step[r, c]:
+                step[r, c], side[r, c] = value, 2 if gap > 0 else 4
+
+
+@part
+def _steepest(row, col, r, c, dr, dc, gap, near):
+    """Whether no pair of neighbours within `SMEAR` pixels differs more: a sensor smears a step over some pixels."""
+    sign = 1.0 if gap > 0 else -1.0
+    for apart in range(1, SMEAR + 1):
+        p, q = row - apart * dr, col - apart * dc
+        if p < 0 or q < 0:
+            break
+        if sign * (near[p + dr, q + dc] - near[p, q]) > sign * gap:
+            return False
+    for apart in range(1, SMEAR + 1):
+        u, v = r + apart * dr, c + apart * dc
+        if u >= near.shape[0] or v >= near.shape[1]:
+            break
+        if sign * (near[u, v] - near[u - dr, v - dc]) > sign * gap:
+            return False
+    return True
+
+
+def find_voids(rays: Rays) -> np.ndarray:
+    """Mark holes that are wider than `BRIDGE` pixels, (H, W) uint8: what squares cover that are all hole.
+
+    Between lines that lie far apart nothing is wide: there only holes along the lines count, wider than is bridged.
+    """
+    down, right = rays.pitch
+    size = (1, BRIDGED + 1) if down > APART * right else (BRIDGED + 1, 1) if right > APART * down else (BRIDGE + 1,) * 2
+    void = np.zeros(rays.near.shape, np.uint8)
+    run_slices(_voids, len(void), rays.near, size, void, size=_BAND)
+    return void
+
+
+def find_rims(near: np.ndarray, void: np.ndarray) -> np.ndarray:
+    """Pixels beside a void; (H, W) bool."""
+    rim = np.zeros(near.shape, np.bool_)
+    run_slices(_rims, len(near), near, void, rim, size=_BAND)
+    return rim
+
+
+@kernel
+def _voids(start, stop, near, size, void):
+    """Mark what rectangles of a size that are all hole cover."""
+    height, width = near.shape
+    for row in range(start, stop):
+        across = np.zeros(width, np.uint8)
+        for top in range(max(row - size[0] + 1, 0), min(row, height - size[0]) + 1):
+            run = 0
+            for col in range(width):
+                hole = True
+                for r in range(top, top + size[0]):
+                    if near[r, col] == near[r, col]:
+                        hole = False
+                        break
+                run = run + 1 if hole else 0
+                if run >= size[1]:
+                    for c in range(col - size[1] + 1, col + 1):
+                        across[c] = 1
+        for col in range(width):
+            void[row, col] = across[col]
+
+
+@kernel
+def _rims(start, stop, near, void, rim):
+    height, width = near.shape
+    for row in range(start, stop):
+        for col in range(width):
+            if near[row, col] == near[row, col]:
+                rim[row, col] = (
+                    (row > 0 and void[row - 1, col])
+                    or (row + 1 < height and void[row + 1, col])
+                    or (col > 0 and void[row, col - 1])
+                    or (col + 1 < width and void[row, col + 1])
+                )
