@@ -47,6 +47,8 @@ class Folds:
         Unit vector in the image from the second to the first, rows and columns of pixels.
     offset : (M,) float64
         Where the line runs from the middle of the cell, in pixels along `across`.
+    convex : (M,) bool
+        Whether the surface falls away from the viewer on both sides.
     """
 
     level: np.ndarray
@@ -55,6 +57,7 @@ class Folds:
     second: np.ndarray
     across: np.ndarray
     offset: np.ndarray
+    convex: np.ndarray
 
 
 def find_folds(rays: Rays, facets: Facets) -> Folds:
@@ -79,13 +82,17 @@ def find_folds(rays: Rays, facets: Facets) -> Folds:
     size, way = np.divmod(chosen, len(DIRECTIONS))
     down, right = shifts[size, way].T
     step = shifts[size, way] * facets.cell * (facets.stretch, 1.0)
+    one, other = (size, row + down, col + right), (size, row - down, col - right)
+    first, second = facets.plane[one][:, :3], facets.plane[other][:, :3]
+    between = facets.ray[one[1:]][:, :3] - facets.ray[other[1:]][:, :3]
     return Folds(
         level[row, col],
         np.column_stack([row, col]),
-        facets.plane[size, row + down, col + right, :3],
-        facets.plane[size, row - down, col - right, :3],
+        first,
+        second,
         step / np.linalg.norm(step, axis=1, keepdims=True),
         offset[row, col].astype(np.float64),
+        ((first - second) * between).sum(axis=1) < 0,
     )
 
 

@@ -53,19 +53,15 @@ class Rays:
         """How much `near` changes where the surface recedes by the width of a pixel: what one spacing is in it."""
         return self.side * near if self.central else np.full_like(near, self.side)
 
-    def normals(self, planes: np.ndarray) -> np.ndarray:
-        """Unit normals (M, 3) float64 of planes (M, 3), towards the viewer."""
-        out = -planes.astype(np.float64)
+    def planes(self, fitted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Unit normals (M, 3) towards the viewer, and offsets (M,) ``normal . p``, of fitted planes m (M, 3)."""
+        out = -fitted.astype(np.float64)
+        offset = np.full(len(out), -1.0) if self.central else -out[:, 2]
         if not self.central:
             out[:, 2] = -1.0
-        out = out @ self.axes
-        return out / np.linalg.norm(out, axis=1, keepdims=True)
-
-    def points(self, ray: np.ndarray, near: np.ndarray) -> np.ndarray:
-        """Place (M, 3) float64 in the cloud of what rays (M, 3) meet at numbers `near` (M,)."""
-        if self.central:
-            return ray / near[:, None] + self.origin
-        return np.column_stack([ray[:, :2], -near]) @ self.axes + self.origin
+        length = np.linalg.norm(out, axis=1)
+        normals = out @ self.axes / length[:, None]
+        return normals, offset / length + normals @ self.origin
 
 
 def trace_rays(image: RangeImage, xyz: np.ndarray) -> Rays:

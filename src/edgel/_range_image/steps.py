@@ -79,8 +79,8 @@ def _sample(start, stop, places, near, ray, plane, noise, cell, values):
             r, c = (row, col + 2 * SMEAR + 1) if way == 0 else (row + 2 * SMEAR + 1, col)
             if r >= height or c >= width or near[r, c] != near[r, c]:
                 continue
-            i, j, _ = _own_plane(row, col, near, ray, plane, cell)
-            a, b, _ = _own_plane(r, c, near, ray, plane, cell)
+            i, j, _ = own_plane(row, col, near, ray, plane, cell)
+            a, b, _ = own_plane(r, c, near, ray, plane, cell)
             if i < 0 or a < 0:
                 continue
             step = 0.0
@@ -91,7 +91,7 @@ def _sample(start, stop, places, near, ray, plane, noise, cell, values):
 
 
 @part
-def _own_plane(row, col, near, ray, plane, cell):
+def own_plane(row, col, near, ray, plane, cell):
     """Cell of the window that fits a pixel's own side best, and the plane's misfit there and in all, squared."""
     i, j = row // cell[0], col // cell[1]
     best, where_i, where_j = np.inf, -1, -1
@@ -117,8 +117,8 @@ def _leap(row, col, r, c, dr, dc, near, ray, plane, noise, cell):
     height, width = near.shape
     gap = near[r, c] - near[row, col]
     sigma = noise[row // cell[0], col // cell[1]]
-    i, j, misfit = _own_plane(row, col, near, ray, plane, cell)
-    a, b, other = _own_plane(r, c, near, ray, plane, cell)
+    i, j, misfit = own_plane(row, col, near, ray, plane, cell)
+    a, b, other = own_plane(r, c, near, ray, plane, cell)
     limit = 16 * sigma * sigma
     if i >= 0 and a >= 0 and misfit < limit and other < limit:
         here = there = 0.0

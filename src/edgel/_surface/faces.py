@@ -3,38 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
+from edgel._faces import Faces, facing
 from edgel._surface import hinge
 from edgel._surface.classify import Classification
 from edgel._surface.evidence import MIN_TURN, Evidence
-
-
-@dataclass(frozen=True, eq=False)
-class Faces:
-    """The geometry of edges at some points; NaN where no fit explains the point.
-
-    Attributes
-    ----------
-    position : (M, 3) float64
-        Foot of the point on the line in which the planes meet.
-    direction : (M, 3) float64
-        Unit tangent of that line.
-    normals : (M, 2, 3) float64
-        Unit normals of both planes, on the side the viewer is on.
-    angle : (M,) float64
-        Turn from one plane to the other, radians, 0 to pi.
-    convex : (M,) int8
-        1 where the side of the normals is the outside of the wedge, -1 where it is the inside, 0 where unknown.
-    """
-
-    position: np.ndarray
-    direction: np.ndarray
-    normals: np.ndarray
-    angle: np.ndarray
-    convex: np.ndarray
 
 
 def localize(
@@ -63,15 +38,8 @@ def localize(
     found = crease_faces(creases.evidence, xyz[creases.points], viewpoint)
     known = found.convex != 0
     at = np.searchsorted(edge, creases.points[known])
-    faces = Faces(
-        position=xyz[edge],
-        direction=np.full((len(edge), 3), np.nan),
-        normals=np.stack([normals, np.full_like(normals, np.nan)], axis=1),
-        angle=np.full(len(edge), np.nan),
-        convex=np.zeros(len(edge), np.int8),
-    )
-    for name in Faces.__dataclass_fields__:
-        getattr(faces, name)[at] = getattr(found, name)[known]
+    faces = Faces.of_points(xyz[edge], normals)
+    faces.put(at, found, known)
     return faces
 
 
@@ -97,21 +65,12 @@ def crease_faces(evidence: Evidence, xyz: np.ndarray, viewpoint: np.ndarray | No
     known = evidence.placed & (turn > MIN_TURN)
     # Turned so that each normal points away from the other face's wing, both lie on the outside of the wedge.
     a, b = _away_from(a, wing_b), _away_from(b, wing_a)
-    out = a + b
-    if viewpoint is None:
-        inside = (out[:, 2] < 0) | ((out[:, 2] == 0) & ((out[:, 1] < 0) | ((out[:, 1] == 0) & (out[:, 0] < 0))))
-    else:
-        inside = ((viewpoint - xyz) * out).sum(axis=1) < 0
-    sign = np.where(inside, -1.0, 1.0)
-    # The face that the viewer sees better comes first.
-    sight = np.array([0.0, 0.0, 1.0]) if viewpoint is None else viewpoint - xyz
-    swap = sign[:, None] * ((b - a) * sight).sum(axis=1, keepdims=True) > 0
-    a, b = np.where(swap, b, a), np.where(swap, a, b)
+    normals, sign = facing(xyz, (a, b), viewpoint)
     unknown = np.where(known, 1.0, np.nan)[:, None]
     return Faces(
         position=xyz + foot * unknown,
         direction=line * unknown,
-        normals=np.stack([a, b], axis=1) * (sign[:, None] * unknown)[:, None],
+        normals=normals * unknown[:, None],
         angle=turn * unknown[:, 0],
         convex=np.where(known, sign, 0).astype(np.int8),
     )
