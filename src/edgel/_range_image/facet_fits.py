@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from edgel._kernels.parallel import kernel, run_slices
+from edgel._range_image.noise import is_white, noise_level
 from edgel._range_image.rays import Rays
 
 HALVES = np.array([1, 3, 5])
@@ -19,8 +20,6 @@ CELL = 2  # pixels along each side
 FULL = 0.6  # least share of a window that has to be seen
 FINEST = 0.01  # spacings: least noise; below, float32 rounds
 _BAND = 48  # rows of cells
-_TILE = 16  # cells, over which the noise is estimated
-_QUIET = 0.25  # of the windows there: most may lie on edges, and without edges all leave nearly the same
 _SUMS = 11  # q q^T (6), q near (3), near near, number
 
 
@@ -42,6 +41,8 @@ class Facets:
         Rows and columns of pixels of a cell.
     stretch : float
         Height of a pixel over its width.
+    white : bool
+        Whether the noise of neighbouring pixels is independent, or hardly any is there.
     """
 
     ray: np.ndarray
@@ -50,6 +51,7 @@ class Facets:
     ratio: np.ndarray
     cell: tuple[int, int]
     stretch: float
+    white: bool
 
 
 def fit_facets(rays: Rays) -> Facets:
@@ -60,45 +62,19 @@ def fit_facets(rays: Rays) -> Facets:
     shape = (-(-rays.near.shape[0] // cell[0]), -(-rays.near.shape[1] // cell[1]))
     ray, plane = np.empty((*shape, 4), np.float32), np.empty((len(HALVES), *shape, 4), np.float32)
     run_slices(_fit, shape[0], rays.ray, rays.near, cell, HALVES, FULL, ray, plane, size=_BAND)
-    noise = _noise(plane[0, :, :, 3])
+    noise = noise_level(plane[0, :, :, 3])
     noise = np.fmax(noise, FINEST * (rays.side * ray[:, :, 3] if rays.central else rays.side))
     ratio = [1.0]
     for s in range(1, len(HALVES)):
         ratios = plane[s, ::2, ::2, 3] / noise[::2, ::2]
         ratios = ratios[np.isfinite(ratios)]
         ratio.append(max(float(np.median(ratios)), 1.0) if len(ratios) else 1.0)
-    return Facets(ray, plane, noise.astype(np.float32), np.array(ratio), cell, stretch)
+    noise = noise.astype(np.float32)
+    return Facets(ray, plane, noise, np.array(ratio), cell, stretch, is_white(rays, ray[:, :, 3], noise, cell))
 
 
 def _stretched(stretch: float) -> tuple[int, int]:
     return (1, int(np.clip(round(stretch), 1, 8))) if stretch > 1 else (int(np.clip(round(1 / stretch), 1, 8)), 1)
-
-
-def _noise(left: np.ndarray) -> np.ndarray:
-    """Lower quartile of what the smallest windows leave, over tiles; of 3 x 3 tiles the median, since some are full of edges."""
-    tiles = tuple(-(-length // _TILE) for length in left.shape)
-    level = np.empty(tiles)
-    run_slices(_tile_levels, tiles[0], left, level, size=1)
-    known = ~np.isnan(level)
-    level = np.where(known, level, np.median(level[known]) if known.any() else 0.0)
-    around = np.pad(level, 1, mode="edge")
-    nine = [around[i : i + tiles[0], j : j + tiles[1]] for i in range(3) for j in range(3)]
-    level = np.sort(nine, axis=0)[4]
-    return level.repeat(_TILE, axis=0)[: left.shape[0]].repeat(_TILE, axis=1)[:, : left.shape[1]]
-
-
-@kernel
-def _tile_levels(start, stop, left, level):
-    values = np.empty(_TILE * _TILE)
-    for i in range(start, stop):
-        for j in range(level.shape[1]):
-            count = 0
-            for row in range(i * _TILE, min((i + 1) * _TILE, left.shape[0])):
-                for col in range(j * _TILE, min((j + 1) * _TILE, left.shape[1])):
-                    if left[row, col] < np.inf:
-                        values[count] = left[row, col]
-                        count += 1
-            level[i, j] = np.quantile(values[:count], _QUIET) if count >= _TILE else np.nan
 
 
 @kernel

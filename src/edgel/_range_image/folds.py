@@ -27,6 +27,7 @@ BESIDE = 2.0, 0.1  # pixels, and widths of the window, from the middle at which 
 PARABOLA = 0.3, 0.7  # pixels, and shares of what a parabola does, by which a fold's middle may leave its planes
 DIRECTIONS = np.array([(0, 1), (1, 2), (1, 1), (2, 1), (1, 0), (2, -1), (1, -1), (1, -2)], float)
 DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1)[:, None]
+_SPREAD = 0.25, 0.3186  # quantile of chance that tells its spread, and the normal distribution's: true folds are above
 _SAMPLES = 1500  # places at which chance is looked at
 _BAND = 8  # rows of cells
 
@@ -122,7 +123,7 @@ def _chance(rays: Rays, facets: Facets, shifts: np.ndarray, lengths: np.ndarray)
     for s in range(len(HALVES)):
         known = values[:, s][np.isfinite(values[:, s])]
         if len(known):
-            spread[s] = max(float(np.median(known)) / 0.6745, 1.0)
+            spread[s] = max(float(np.quantile(known, _SPREAD[0])) / _SPREAD[1], 1.0)
     return spread
 
 

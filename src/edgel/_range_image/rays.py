@@ -14,6 +14,7 @@ import numpy as np
 from edgel._kernels.parallel import kernel, run_slices
 from edgel._range_image.range_image import RangeImage
 
+APART = 1.7  # times the pitch along lines, from which lines (of a spinning sensor) lie far apart
 _BAND = 16  # rows
 
 

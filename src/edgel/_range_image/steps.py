@@ -7,7 +7,7 @@ import numpy as np
 from edgel._kernels.hysteresis import levels
 from edgel._kernels.parallel import kernel, part, run_slices
 from edgel._range_image.facet_fits import Facets
-from edgel._range_image.rays import Rays
+from edgel._range_image.rays import APART, Rays
 
 STEP = 2.0  # spacings: least break of the surface between two pixels
 GAP = 2.0  # spacings: least difference of their depths
@@ -19,8 +19,8 @@ CHAIN = 8  # pixels: chains of both sides that are shorter are specks
 SHEER = 4.0, 4  # times all that, and pixels: steps so high need no longer chain
 BRIDGE = 2  # pixels: a hole no wider is bridged; where it slants, it may be BRIDGED wide along rows or columns
 BRIDGED = 5
-APART = 2.0  # times the pitch along lines, from which lines lie far apart
 NEARBY = 2  # cells within which the window of a pixel's own side lies
+HELD = 0.25  # of the gap beside it, within which neighbours hold a pixel that no window fits
 _SPREAD = 0.7, 1.0364  # quantile of chance that tells its spread, and the normal distribution's: chance has long tails
 _SAMPLES = 1500  # places at which chance is looked at
 _BAND = 16  # rows
@@ -42,12 +42,13 @@ def find_steps(rays: Rays, facets: Facets, void: np.ndarray) -> tuple[np.ndarray
     """
     shape = rays.near.shape
     step, side = np.zeros(shape, np.float32), np.zeros(shape, np.uint8)
-    sure = SURE * _chance(rays, facets)
+    # Where neighbours share no noise no sensor has smeared the steps, and chance is what it should be.
+    smear, sure = (0, SURE) if facets.white else (SMEAR, SURE * _chance(rays, facets))
     bridged = [int(BRIDGED * min(rays.pitch) / rays.pitch[1 - way] + 0.5) for way in (0, 1)]
     for way in (0, 1):  # a pixel belongs to pairs of two rows: bands of the second way are columns
         run_slices(
             _steps, shape[way], way, rays.near, rays.ray, facets.plane[0], facets.noise, facets.cell,
-            max(rays.side, rays.pitch[1 - way]), rays.central, sure, void, bridged[way], step, side, size=_BAND,
+            max(rays.side, rays.pitch[1 - way]), rays.central, sure, void, bridged[way], smear, step, side, size=_BAND,
         )  # fmt: skip
     step = step.astype(np.float64)
     level = levels(step, WEAK, CHAIN)
@@ -112,6 +113,17 @@ def own_plane(row, col, near, ray, plane, cell):
 
 
 @part
+def _held(row, col, gap, near):
+    """Whether two of the eight neighbours are much nearer to a pixel than the gap is wide: no outlier."""
+    count = 0
+    for r in range(max(row - 1, 0), min(row + 2, near.shape[0])):
+        for c in range(max(col - 1, 0), min(col + 2, near.shape[1])):
+            if abs(near[r, c] - near[row, col]) < HELD * abs(gap):
+                count += 1
+    return count > 2  # itself among them
+
+
+@part
 def _leap(row, col, r, c, dr, dc, near, ray, plane, noise, cell):
     """Step that neither side's slope explains, and its noise."""
     height, width = near.shape
@@ -131,7 +143,9 @@ def _leap(row, col, r, c, dr, dc, near, ray, plane, noise, cell):
             return 0.0, 1.0
         left = max(plane[i, j, 3], plane[a, b, 3], sigma)
         return min(abs(here), abs(there)), left
-    # Too thin for a window: the pixels behind either one tell the slope.
+    # Too thin for a window: neighbours have to hold it, and the pixels behind tell the slope.
+    if (not misfit < limit and not _held(row, col, gap, near)) or (not other < limit and not _held(r, c, gap, near)):
+        return 0.0, sigma
     leap = abs(gap)
     for s in range(2):
         p, q = (row - dr, col - dc) if s == 0 else (r + dr, c + dc)
@@ -144,7 +158,7 @@ def _leap(row, col, r, c, dr, dc, near, ray, plane, noise, cell):
 
 
 @kernel
-def _steps(start, stop, way, near, ray, plane, noise, cell, unit, central, sure, void, bridged, step, side):
+def _steps(start, stop, way, near, ray, plane, noise, cell, unit, central, sure, void, bridged, smear, step, side):
     height, width = near.shape
     dr, dc = (0, 1) if way == 0 else (1, 0)
     rows = (start, stop) if way == 0 else (0, height)
@@ -162,11 +176,11 @@ def _steps(start, stop, way, near, ray, plane, noise, cell, unit, central, sure,
                 continue
             gap = near[r, c] - own
             spacing = unit * max(own, near[r, c]) if central else unit
-            if not abs(gap) > LEAST * spacing or not _steepest(row, col, r, c, dr, dc, gap, near):
+            if not abs(gap) > LEAST * spacing or not _steepest(row, col, r, c, dr, dc, gap, near, smear):
                 continue
             sigma = noise[row // cell[0], col // cell[1]]
             value = 0.0
-            for apart in range(min(SMEAR, bridged) + 1):
+            for apart in range(min(smear, bridged) + 1):
                 p, q, u, v = row - apart * dr, col - apart * dc, r + apart * dr, c + apart * dc
                 if p < 0 or q < 0 or u >= height or v >= width:
                     break
@@ -182,16 +196,16 @@ def _steps(start, stop, way, near, ray, plane, noise, cell, unit, central, sure,
 
 
 @part
-def _steepest(row, col, r, c, dr, dc, gap, near):
+def _steepest(row, col, r, c, dr, dc, gap, near, smear):
     """Whether no pair of neighbours within `SMEAR` pixels differs more: a sensor smears a step over some pixels."""
     sign = 1.0 if gap > 0 else -1.0
-    for apart in range(1, SMEAR + 1):
+    for apart in range(1, smear + 1):
         p, q = row - apart * dr, col - apart * dc
         if p < 0 or q < 0:
             break
         if sign * (near[p + dr, q + dc] - near[p, q]) > sign * gap:
             return False
-    for apart in range(1, SMEAR + 1):
+    for apart in range(1, smear + 1):
         u, v = r + apart * dr, c + apart * dc
         if u >= near.shape[0] or v >= near.shape[1]:
             break

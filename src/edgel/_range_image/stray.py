@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel, run_slices
-from edgel._range_image.rays import Rays
+from edgel._kernels.parallel import kernel, part, run_slices
+from edgel._range_image.rays import APART, Rays
 
 CLOSE = 3.0  # spacings, and median differences of neighbours, within which a neighbour holds a pixel
 HELD = 2, 4  # of the 8 neighbours, or of the 24, that hold a pixel
+ON_LINE = 1, 2  # the same where lines lie far apart, and neighbours on others are no help
 _BAND = 16  # rows
 _SAMPLE = 4  # rows and columns between the pixels whose neighbours are compared
 
@@ -24,13 +25,15 @@ def without_stray(rays: Rays) -> Rays:
     usual = float(np.median(step[known] / unit[known])) if known.any() else 0.0
     kept = np.empty_like(near)
     close = CLOSE * (1.0 + usual) * rays.side
-    run_slices(_without_stray, len(near), near, close, rays.central, HELD, kept, size=_BAND)
+    held = HELD if max(rays.pitch) < APART * min(rays.pitch) else ON_LINE
+    run_slices(_without_stray, len(near), near, close, rays.central, held, kept, size=_BAND)
     return replace(rays, near=kept)
 
 
 @kernel
 def _without_stray(start, stop, near, close, central, held, kept):
     height, width = near.shape
+    steps = np.empty((2, 25), np.float32)
     for row in range(start, stop):
         for col in range(width):
             own = near[row, col]
@@ -38,13 +41,41 @@ def _without_stray(start, stop, near, close, central, held, kept):
             if own != own:
                 continue
             limit = np.float32(close * own) if central else np.float32(close)
-            for reach in range(1, 3):
-                count = -1
-                for r in range(max(row - reach, 0), min(row + reach + 1, height)):
-                    for c in range(max(col - reach, 0), min(col + reach + 1, width)):
-                        if abs(near[r, c] - own) <= limit:
-                            count += 1
-                if count >= held[reach - 1]:
-                    break
-                if reach == 2:
-                    kept[row, col] = np.nan
+            if _count(near, row, col, 1, limit) >= held[0] or _count(near, row, col, 2, limit) >= held[1]:
+                continue
+            # Where the surface is steep, neighbours are farther away: as far as they are from each other.
+            steep = np.float32(CLOSE) * _steepness(near, row, col, steps)
+            if _count(near, row, col, 2, limit + steep) < held[1]:
+                kept[row, col] = np.nan
+
+
+@part
+def _count(near, row, col, reach, limit):
+    """Number of neighbours within a reach whose depth is close to the pixel's own."""
+    count = -1
+    for r in range(max(row - reach, 0), min(row + reach + 1, near.shape[0])):
+        for c in range(max(col - reach, 0), min(col + reach + 1, near.shape[1])):
+            if abs(near[r, c] - near[row, col]) <= limit:
+                count += 1
+    return count
+
+
+@part
+def _steepness(near, row, col, steps):
+    """Median difference of neighbours along rows or along columns, whichever is larger, in the square of 25."""
+    height, width = near.shape
+    counts = np.zeros(2, np.int64)
+    for r in range(max(row - 2, 0), min(row + 3, height)):
+        for c in range(max(col - 2, 0), min(col + 3, width)):
+            for way in range(2):
+                p, q = (r + 1, c) if way == 0 else (r, c + 1)
+                if p < min(row + 3, height) and q < min(col + 3, width):
+                    step = abs(near[p, q] - near[r, c])
+                    if step == step:
+                        steps[way, counts[way]] = step
+                        counts[way] += 1
+    steepest = np.float32(0.0)
+    for way in range(2):
+        if counts[way] > 0:
+            steepest = max(steepest, np.median(steps[way, : counts[way]]))
+    return steepest

@@ -1,0 +1,65 @@
+"""The noise of a range image: how much there is around each cell, and whether neighbouring pixels share it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from edgel._kernels.parallel import kernel, run_slices
+from edgel._range_image.rays import APART, Rays
+
+CLEAN = 0.1  # spacings: noise below which it does not matter whose it is
+WHITE = 0.9  # least of the noise that second differences of neighbours show: smoothed or rounded, they show less
+_TILE = 16  # cells, over which the noise is estimated
+_QUIET = 0.25  # of the windows there: most may lie on edges, and without edges all leave nearly the same
+_EVERY = 4  # rows or columns between those whose second differences are taken
+
+
+def noise_level(left: np.ndarray) -> np.ndarray:
+    """Lower quartile of what the smallest windows leave, over tiles; of 3 x 3 tiles the median, since some are full of edges."""
+    tiles = tuple(-(-length // _TILE) for length in left.shape)
+    level = np.empty(tiles)
+    run_slices(_tile_levels, tiles[0], left, level, size=1)
+    known = ~np.isnan(level)
+    level = np.where(known, level, np.median(level[known]) if known.any() else 0.0)
+    around = np.pad(level, 1, mode="edge")
+    nine = [around[i : i + tiles[0], j : j + tiles[1]] for i in range(3) for j in range(3)]
+    level = np.sort(nine, axis=0)[4]
+    return level.repeat(_TILE, axis=0)[: left.shape[0]].repeat(_TILE, axis=1)[:, : left.shape[1]]
+
+
+def is_white(rays: Rays, near: np.ndarray, noise: np.ndarray, cell: tuple[int, int]) -> bool:
+    """Whether the noise of neighbouring pixels is independent, or hardly any is there.
+
+    Sensors that match windows, interpolate or round leave neighbours alike: their second differences, by the noise
+    (I, J) around cells of mean `near` (I, J), are smaller than the sqrt(6) of independent noise, along some direction.
+    """
+    seen = near != 0
+    if not seen.any():
+        return True
+    if np.median(noise[seen] / rays.spacing(near[seen])) < CLEAN:
+        return True
+    stretch = rays.pitch[0] / rays.pitch[1]
+    for axis in (0, 1) if 1 / APART < stretch < APART else (int(stretch > 1),):  # neighbours on other lines are too far
+        image, level = np.moveaxis(rays.near, axis, 0), np.moveaxis(noise, axis, 0)
+        lines = np.arange(0, image.shape[1], _EVERY)
+        bend = np.abs(image[2:, lines] - 2 * image[1:-1, lines] + image[:-2, lines])
+        rows = np.arange(1, len(image) - 1) // cell[axis]
+        share = bend / level[np.ix_(rows, lines // cell[1 - axis])]
+        share = share[np.isfinite(share)]
+        if len(share) and np.median(share) / (0.6745 * np.sqrt(6.0)) < WHITE:
+            return False
+    return True
+
+
+@kernel
+def _tile_levels(start, stop, left, level):
+    values = np.empty(_TILE * _TILE)
+    for i in range(start, stop):
+        for j in range(level.shape[1]):
+            count = 0
+            for row in range(i * _TILE, min((i + 1) * _TILE, left.shape[0])):
+                for col in range(j * _TILE, min((j + 1) * _TILE, left.shape[1])):
+                    if left[row, col] < np.inf:
+                        values[count] = left[row, col]
+                        count += 1
+            level[i, j] = np.quantile(values[:count], _QUIET) if count >= _TILE else np.nan
