@@ -41,7 +41,7 @@ VERSIONS = ("edgel", "numpy", "numba", "scipy", "open3d", "small_gicp", "jakteri
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="few scenes and small clouds, under three minutes")
+    parser.add_argument("--quick", action="store_true", help="few scenes, frames and small clouds, some minutes")
     parser.add_argument(
         "--data", type=Path, default=Path("../shared/data"), help="the shared data, for published scores"
     )

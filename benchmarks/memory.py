@@ -50,9 +50,7 @@ def run() -> list[dict[str, Any]]:
     """Measure each cloud in a process of its own."""
     rows = []
     for name in CLOUDS:
-        done = subprocess.run(
-            [sys.executable, __file__, "--one", name], capture_output=True, text=True, check=True
-        )
+        done = subprocess.run([sys.executable, __file__, "--one", name], capture_output=True, text=True, check=True)
         rows.append(json.loads(done.stdout))
     return rows
 

@@ -56,6 +56,12 @@ def picture(cloud: edgel.Cloud, edges: edgel.Edges) -> np.ndarray:
     return rgb.repeat(high * scale, axis=0).repeat(scale, axis=1)
 
 
+def save(cloud: edgel.Cloud, edges: edgel.Edges, path: Path) -> None:
+    """Write the picture, in 128 colors, the most different ones: enough for grey and the kinds, and half the size."""
+    image = Image.fromarray(picture(cloud, edges)).quantize(128, method=Image.Quantize.MAXCOVERAGE)
+    image.save(path, optimize=True)
+
+
 def shaded(cloud: edgel.Cloud) -> np.ndarray:
     """The surface lit from the sensor's upper left, RGB (H, W, 3); white where nothing was seen."""
     assert cloud.shape is not None
@@ -83,9 +89,7 @@ def main() -> None:
         start = time.perf_counter()
         edges = edgel.detect(cloud)
         seconds = time.perf_counter() - start
-        image = Image.fromarray(picture(cloud, edges))
-        # 128 colors, the most different ones, are enough for grey and the kinds, and half the size.
-        image.quantize(128, method=Image.Quantize.MAXCOVERAGE).save(options.out / f"{name}.png", optimize=True)
+        save(cloud, edges, options.out / f"{name}.png")
         print(f"{name}: {counts(cloud, edges)}, {1e3 * seconds:.0f} ms", flush=True)
 
 

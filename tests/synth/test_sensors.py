@@ -1,4 +1,4 @@
-"""Simulated sensors: depth comes in steps of disparity, errors are alike over a window, steps bleed, lasers mix, truth stays."""
+"""Simulated sensors: depth comes in steps, errors are alike over a window, steps bleed, lasers mix, truth stays."""
 
 from dataclasses import replace
 
@@ -146,7 +146,8 @@ def test_the_near_side_bleeds_over_the_far_one():
 def test_what_the_second_eye_does_not_see_is_lost_beside_the_near_side():
     seen = clean(BLOCK, STEREO, 0.5)
     lost = [
-        np.isfinite(depth_of(seen)) & np.isnan(depth_of(synth.sense(BLOCK, synth.Sensor(baseline=baseline), spacing=0.5)))
+        np.isfinite(depth_of(seen))
+        & np.isnan(depth_of(synth.sense(BLOCK, synth.Sensor(baseline=baseline), spacing=0.5)))
         for baseline in (0.05, 0.2)
     ]
     assert 0 < lost[0].sum() < lost[1].sum() < 0.2 * lost[1].size

@@ -1,10 +1,10 @@
 """Views as real sensors give them: depth in steps, errors alike in neighbouring pixels, steps that bleed, shadows.
 
-Triangulating sensors (structured light, stereo) measure a disparity ``d = f b / z``, in pixels, by matching windows of two
-pictures (K. Khoshelham and S. Elberink, Accuracy and Resolution of Kinect Depth Data for Indoor Mapping Applications,
-Sensors 12(2), 2012, doi:10.3390/s120201437): its error is alike over a window, it is rounded to a part of a pixel,
-and what only one of both eyes sees is lost. A spinning laser measures a range; where its beam falls on the near and the
-far side of a step, it gives something between.
+Triangulating sensors (structured light, stereo) measure a disparity ``d = f b / z``, in pixels, by matching windows of
+two pictures (K. Khoshelham and S. Elberink, Accuracy and Resolution of Kinect Depth Data for Indoor Mapping
+Applications, Sensors 12(2), 2012, doi:10.3390/s120201437): its error is alike over a window, it is rounded to a part of
+a pixel, and what only one of both eyes sees is lost. A spinning laser measures a range; where its beam falls on both
+sides of a step, it gives something between.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ class Sensor:
     Attributes
     ----------
     baseline : float
-        Distance between both eyes, in distances to the middle of what is seen; 0: a spinning laser, which measures the range.
+        Distance between both eyes, in distances to the middle of what is seen; 0: a spinning laser, which measures the
+        range.
     steps : int
         Levels of disparity in a pixel; 0: not rounded.
     noise : float
@@ -73,9 +74,9 @@ SENSORS = {
     "stereo": Sensor(baseline=0.12, steps=16, noise=0.12, window=5, bleed=2.0, mixed=0.2),
     "spinning": Sensor(noise=0.3, mixed=0.5),
 }
-"""Kinect and PrimeSense: 75 mm, 1/8 pixel, 9 x 9 pixels, errors of one half to one step; a projecting stereo camera (Ensenso):
-100 mm, 1/16 pixel, 5 x 5 pixels, errors of two steps; both at 0.8 m, as frames of theirs show on flat faces. A spinning laser of 16 rings
-(11 mm at 3 m, the beam about as wide as its shots are apart)."""
+"""Sensors by name: Kinect and PrimeSense (75 mm, 1/8 pixel, 9 x 9 pixels, errors of one half to one step), a projecting
+stereo camera (Ensenso: 100 mm, 1/16 pixel, 5 x 5 pixels, errors of two steps), both at 0.8 m, as frames of theirs show
+on flat faces; and a spinning laser of 16 rings (11 mm at 3 m, the beam about as wide as its shots are apart)."""
 
 
 def sense(
@@ -118,27 +119,31 @@ def sense(
     """
     projection = "pinhole" if sensor.baseline else "spherical"
     seen = view(solid, projection=projection, spacing=spacing, direction=direction, roll=roll)
-    assert seen.depth is not None
+    depth = seen.depth
+    assert depth is not None
     rng = np.random.default_rng(seed)
-    kind = seen.point_kind.reshape(seen.depth.shape)
-    measured = _triangulated(seen, kind, sensor, rng) if sensor.baseline else _ranged(seen, kind, sensor, rng)
-    with np.errstate(invalid="ignore"):
-        xyz = seen.noise_free * (measured / seen.depth).reshape(-1, 1)
+    kind = seen.point_kind.reshape(depth.shape)
+    if sensor.baseline:
+        measured = _triangulated(depth, kind, focal_length(seen), sensor, rng)
+    else:
+        measured = _ranged(depth, kind, seen.spacing, sensor, rng)
+    xyz = seen.noise_free * (measured / depth).reshape(-1, 1)
     name = f"{solid.name}/{next((name for name, one in SENSORS.items() if one == sensor), 'sensor')}"
     return replace(seen, name=name, cloud=replace(seen.cloud, xyz=xyz), depth=measured)
 
 
-def _triangulated(seen: Scene, kind: np.ndarray, sensor: Sensor, rng: np.random.Generator) -> np.ndarray:
+def _triangulated(
+    depth: np.ndarray, kind: np.ndarray, focal: float, sensor: Sensor, rng: np.random.Generator
+) -> np.ndarray:
     """Depth (H, W), mm, by the disparity of two eyes; NaN where there is none."""
-    depth = seen.depth
-    focal, middle = focal_length(seen), float(np.nanmedian(depth))
-    across = focal * sensor.baseline * middle  # disparity times depth
+    baseline = sensor.baseline * float(np.nanmedian(depth))
+    across = focal * baseline  # disparity times depth
     true = across / depth
     front, reach = _fronts(depth, kind, int(np.ceil(sensor.bleed)) + 1, (0, 1))
     edge = sensor.bleed * np.clip(0.5 + 0.5 * _alike(depth.shape, sensor.window, rng), 0, 1)
     bled = np.where(reach <= edge, across / front, true)
     error = sensor.noise * _alike(depth.shape, sensor.window, rng)
-    found = _means(bled, sensor.window, _STEEPEST * sensor.baseline * middle / depth) + error
+    found = _means(bled, sensor.window, _STEEPEST * baseline / depth) + error
     flying = (reach - 1 <= edge) & (edge < reach) & (rng.random(depth.shape) < sensor.mixed)
     share = rng.random(depth.shape)
     between = share * across / front + (1 - share) * true
@@ -149,11 +154,12 @@ def _triangulated(seen: Scene, kind: np.ndarray, sensor: Sensor, rng: np.random.
     return across / found
 
 
-def _ranged(seen: Scene, kind: np.ndarray, sensor: Sensor, rng: np.random.Generator) -> np.ndarray:
+def _ranged(
+    depth: np.ndarray, kind: np.ndarray, spacing: float, sensor: Sensor, rng: np.random.Generator
+) -> np.ndarray:
     """Range (H, W), mm, by a laser whose rings are the rows; NaN for misses."""
-    depth = seen.depth
     front, reach = _fronts(depth, kind, 1, (1,))
-    measured = depth + sensor.noise * seen.spacing * rng.standard_normal(depth.shape)
+    measured = depth + sensor.noise * spacing * rng.standard_normal(depth.shape)
     flying = (reach == 1) & (rng.random(depth.shape) < sensor.mixed)
     share = rng.random(depth.shape)
     return np.where(flying, share * front + (1 - share) * depth, measured)
@@ -166,22 +172,24 @@ def focal_length(seen: Scene) -> float:
 
 
 def _fronts(depth: np.ndarray, kind: np.ndarray, most: int, axes: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
-    """For pixels beyond a step in depth: depth of its near side, and pixels to it, along the axes, up to `most` (else inf)."""
-    front, gap = np.full(depth.shape, np.nan), np.full(depth.shape, np.nan)
+    """How deep the near side is of the step that a pixel is beyond, and how many pixels away; inf beyond `most`.
+
+    Looked for along the axes, from the step outward; views have an empty frame, so that nothing reaches around.
+    """
+    front, step = np.full(depth.shape, np.nan), np.full(depth.shape, np.nan)
     reach = np.full(depth.shape, np.inf)
-    near = np.where((kind & int(EdgeKind.OCCLUDING)) > 0, depth, np.nan)
-    far = (kind & int(EdgeKind.OCCLUDED)) > 0
+    before = np.where((kind & int(EdgeKind.OCCLUDING)) > 0, depth, np.nan)
+    reachable = (kind & int(EdgeKind.OCCLUDED)) > 0
     for pixels in range(1, most + 1):
-        before, apart = front.copy(), gap.copy()
+        steps = step.copy()
         for axis in axes:
             for way in (-1, 1):
-                beside = np.roll(near if pixels == 1 else before, way, axis)
-                step = depth - beside if pixels == 1 else np.roll(apart, way, axis)
-                # What follows belongs to the far side as long as it is nearer to it than to the near one.
-                with np.errstate(invalid="ignore"):
-                    new = (depth - beside > step / 2) & (far if pixels == 1 else np.isinf(reach) | (reach == pixels))
-                    new &= ~(front <= beside)
-                front[new], gap[new], reach[new] = beside[new], step[new], pixels
+                beside = np.roll(before, way, axis)
+                gap = depth - beside if pixels == 1 else np.roll(steps, way, axis)
+                # The far side goes on as long as a pixel is nearer to it than to the near one.
+                new = reachable & (depth - beside > gap / 2) & ~(front <= beside)
+                front[new], step[new], reach[new] = beside[new], gap[new], pixels
+        before, reachable = front.copy(), np.isinf(reach)
     return front, reach
 
 
@@ -214,7 +222,7 @@ def _means(values: np.ndarray, window: int, steepest: np.ndarray) -> np.ndarray:
 
 
 def _shadow(disparity: np.ndarray) -> np.ndarray:
-    """Pixels (H, W) that the second eye, to the right of the first, does not see: something further right is before them."""
+    """Pixels (H, W) that the second eye, right of the first, does not see: something further right is before them."""
     columns = np.arange(disparity.shape[1])
     there = np.where(np.isfinite(disparity), columns - disparity, np.inf)
     ahead = np.minimum.accumulate(there[:, ::-1], axis=1)[:, ::-1]
