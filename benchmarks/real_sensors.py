@@ -29,7 +29,7 @@ import edgel
 
 SETS = ("mosd", "ycbv", "lidar_board", "ahn3_bgt", "stereo")
 ROUNDS, QUICK_FRAMES = 3, 3
-EDGEL, PCL = "edgel default", "PCL organized, defaults"
+EDGEL, PCL = "edgel default", "PCL organized, gradient"
 NOT_ORGANIZED = ("ahn3_bgt",)
 Detector = Callable[[np.ndarray], np.ndarray]
 Row = dict[str, Any]
@@ -48,7 +48,7 @@ def detect_edgel(points: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 def detect_pcl(points: np.ndarray) -> tuple[np.ndarray, float]:
-    """Kinds of points (H, W, 3), metres, the camera at the origin, by PCL with what its documentation sets; and its seconds."""
+    """Kinds of points (H, W, 3), metres, the camera at the origin, by PCL with its documented defaults; and its seconds."""
     bits, seconds = programs.run(
         "pcl_organized",
         edgel.Cloud(points),

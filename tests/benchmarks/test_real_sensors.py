@@ -113,5 +113,5 @@ def test_tables_say_how_many_times_as_long():
     ]
     assert real_sensors.tables(rows).splitlines()[2:] == [
         "| edgel default | 0.500 | 2 | 300.0 | 2.00 |",
-        "| PCL organized, defaults | 1.000 | 2 | 150.0 | 1.00 |",
+        "| PCL organized, gradient | 1.000 | 2 | 150.0 | 1.00 |",
     ]
