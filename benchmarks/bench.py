@@ -23,9 +23,11 @@ from typing import Any
 import accuracy
 import geometry
 import growth
+import memory
 import normals
 import promises
 import published
+import real_sensors
 import report
 import roofline
 import scenes
@@ -39,10 +41,11 @@ VERSIONS = ("edgel", "numpy", "numba", "scipy", "open3d", "small_gicp", "jakteri
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="few scenes and small clouds, under three minutes")
+    parser.add_argument("--quick", action="store_true", help="few scenes, frames and small clouds, some minutes")
     parser.add_argument(
         "--data", type=Path, default=Path("../shared/data"), help="the shared data, for published scores"
     )
+    parser.add_argument("--real", type=Path, default=Path("../shared/real"), help="sets of real sensors with truth")
     parser.add_argument("--no-speed", action="store_true", help="accuracy only")
     options = parser.parse_args()
     start = time.perf_counter()
@@ -57,6 +60,8 @@ def main() -> None:
         "tuning": tuned,
         "accuracy": list(run_accuracy(names, tuned)),
     }
+    results["sensed"] = list(run_accuracy(scenes.SENSED[:: 3 if options.quick else 1], {}))
+    results["real_sensors"] = real_sensors.run(options.real, quick=options.quick)
     truth = options.data / "truth"
     results["published"] = published.published(truth) + published.measured(truth) if truth.is_dir() else []
     results["normals"] = normals.run()
@@ -66,6 +71,8 @@ def main() -> None:
         sizes = (10_000, 100_000) if options.quick else (10_000, 30_000, 100_000, 300_000, 647_984)
         slowest = 2.0 if options.quick else speed.SLOWEST
         results["speed"] = speed.normals_of_all_points(sizes, slowest=slowest) + speed.edges(sizes, slowest)
+        results["frames"] = speed.frames(1 if options.quick else speed.ROUNDS)
+        results["memory"] = memory.run()
         results["stages"] = speed.stages()
         results["roofline"] = roofline.run(min(sizes[-1], 647_984), 3 if options.quick else 7)
         results["promises"] = [] if options.quick else promises.run()

@@ -8,6 +8,7 @@ from typing import Any
 
 import growth
 import promises
+import real_sensors
 import report_plots as plots
 import report_tables as tables
 import roofline
@@ -49,6 +50,7 @@ def summary(results: dict[str, Any]) -> str:
 
 def _page(results: dict[str, Any], rows: list[Row]) -> Iterable[str]:
     yield from _opening(results, rows)
+    yield from _real(results)
     yield from _by_view(rows)
     yield from _by_scene(rows)
     yield from _details(results, rows)
@@ -77,6 +79,16 @@ def _opening(results: dict[str, Any], rows: list[Row]) -> Iterator[str]:
         "`benchmarks/rivals/README.md`, `benchmarks/tuned.json`. A method is scored against every true edge of a scene; "
         "*own kinds* counts only the kinds it claims to find. A crease that turns less than 25 degrees counts neither way."
     )
+
+
+def _real(results: dict[str, Any]) -> Iterator[str]:
+    if results.get("real_sensors"):
+        yield "## Real sensors\n\nTruth that no detector made: labels by hand and planes of whole faces (mosd, Kinect), CAD models at their poses (ycbv, Xtion), a board of known size (lidar_board, spinning lasers), surveyed outlines of buildings (ahn3_bgt, airborne), true disparities (stereo, a block matcher). *jump, outline, contact, crease, rim, eaves*: shares found; *crease_mm, offset, iqr*: how far off, mm, and metres; *false, inner*: edge points where there is none, in 1000; *stray*: crease points off all creases; *precision*: share of right outlines. Both detectors in turn on each frame, 2 threads; medians. Those marked *repository* are in `benchmarks/real` (`benchmarks/real_sensors.py`)."
+        yield real_sensors.tables(results["real_sensors"])
+    if results.get("sensed"):
+        yield "## Simulated sensors\n\nViews with the errors of a Kinect, a projecting stereo camera and a spinning laser (`edgel.synth.sense`): mean F1 at 2.5 spacings, every method with its defaults."
+        rows = results["sensed"]
+        yield tables.by_scene(rows, "view", sorted({row["view"] for row in rows}), lambda row: "all" in row)
 
 
 def _by_view(rows: list[Row]) -> Iterator[str]:
@@ -135,6 +147,11 @@ def _speed(results: dict[str, Any]) -> Iterator[str]:
     yield "![time of normals](benchmarks/time-normals.png)"
     yield tables.times(results["speed"], "edges")
     yield "![time of edges](benchmarks/time-edges.png)"
+    if results.get("frames"):
+        yield "Organized clouds: the default beside PCL's organized edges with either of its normals, and beside Open3D's normals of all points; in brackets how many times as long the default takes. PCL takes the parallel view as one from afar; a list of points it cannot take."
+        yield tables.frame_times(results["frames"])
+    if results.get("memory"):
+        yield tables.memory(results["memory"])
     yield "Stages of both methods at 647,984 points."
     lines = [[s["method"], s["stage"], f"{s['seconds']:.4f}"] for s in results["stages"]]
     yield tables.table(["method", "stage", "s"], lines)

@@ -167,3 +167,21 @@ def times(rows: list[Row], work: str) -> str:
         seconds = {row["points"]: row["seconds"] for row in rows if row["method"] == method}
         lines.append([method, *(f"{seconds[size]:.3g}" if size in seconds else "" for size in sizes)])
     return table([work, *(f"{size:,}" for size in sizes)], lines)
+
+
+def frame_times(rows: list[Row]) -> str:
+    """Milliseconds of each method on each frame, and how many times as long the default takes."""
+    methods = list(dict.fromkeys(row["method"] for row in rows))
+    lines = []
+    for frame in dict.fromkeys(row["frame"] for row in rows):
+        mine = {row["method"]: row["seconds"] for row in rows if row["frame"] == frame}
+        own = mine[methods[0]]
+        times = [f"{1e3 * mine[m]:.1f} (x {own / mine[m]:.2f})" if m in mine else "" for m in methods[1:]]
+        points = next(row["points"] for row in rows if row["frame"] == frame)
+        lines.append([frame, f"{points:,}", f"{1e3 * own:.1f}", *times])
+    return table(["frame, ms", "points", *methods], lines)
+
+
+def memory(rows: list[Row]) -> str:
+    lines = [[row["cloud"], f"{row['points']:,}", f"{row['bytes']:.0f}"] for row in rows]
+    return table(["default, on", "points", "peak above the input, bytes a point"], lines)

@@ -7,6 +7,8 @@ blue_noise, scan_lines, graded); a digit after it takes another of the poses bel
 TEST holds every shape in all seven views and patterns (17 x 7). Noise (0, 0.1, 0.3, 1) and outliers (0, 1, 5 %; three
 fifths have none) go round along shapes and views, so that every level meets every view, pattern and shape family. To that
 come two shapes at all four noises with nothing else changed (LADDER): the curves over noise compare like with like.
+SENSED holds nine shapes as three real sensors see them (kinect, stereo, spinning: `edgel.synth.SENSORS`), whose own errors
+take the place of noise and outliers.
 TUNE holds other shapes, poses and seeds, three scenes for each noise: parameters chosen there have seen nothing of TEST.
 """
 
@@ -41,6 +43,7 @@ TUNE_SHAPES = {
 }
 
 VIEWS = synth.PROJECTIONS
+SENSORS = tuple(synth.SENSORS)
 PATTERNS = ("uniform", "blue_noise", "scan_lines", "graded")
 POSES = (
     {"direction": (-0.48, 0.66, -0.58), "roll": 0.2},
@@ -67,6 +70,11 @@ LADDER = [
     for noise in NOISES
 ]
 TEST = list(dict.fromkeys([*_latin(), *LADDER]))
+SENSED = [
+    f"{shape}/{sensor}/n0/o0"
+    for shape in ("frustum", "stepped_block", "wedge_fan", "thin_plate", "gear", "tee", "flange", "sphere", "plane")
+    for sensor in SENSORS
+]
 TUNE = [
     "pyramid/pinhole2/n0/o0",
     "wedge_bar/uniform2/n0/o1",
@@ -115,16 +123,25 @@ def make(name: str) -> Scene:
         degraded = {"noise": float(noise.removeprefix("n")), "outliers": float(outliers.removeprefix("o")) / 100}
     except ValueError:
         raise ValueError(f"name: expected shape/view/n<noise>/o<percent>, got {name!r}") from None
-    if kind not in (*VIEWS, *PATTERNS):
-        raise ValueError(f"name: expected a view of {(*VIEWS, *PATTERNS)}, got {kind!r}")
+    if kind not in (*VIEWS, *SENSORS, *PATTERNS):
+        raise ValueError(f"name: expected a view of {(*VIEWS, *SENSORS, *PATTERNS)}, got {kind!r}")
+    if kind in SENSORS and any(degraded.values()):
+        raise ValueError(f"name: {kind} has errors of its own, expected n0/o0, got {noise}/{outliers}")
     part = solid(shape)
     seed = int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "little")
     if kind in PATTERNS:
         scene = synth.sample(part, pattern=kind, spacing=part.spacing, seed=seed, **degraded)
+    elif kind in SENSORS:
+        scene = synth.sense(part, synth.SENSORS[kind], spacing=view_spacing(part), seed=seed, **POSES[variant])
     else:
-        spacing = part.spacing * (1.0 if part.boundaries or shape == "thin_plate" else 0.8)
+        spacing = view_spacing(part)
         scene = synth.view(part, projection=kind, spacing=spacing, seed=seed, **degraded, **POSES[variant])
     return Scene(**{key: getattr(scene, key) for key in Scene.__dataclass_fields__} | {"name": name})
+
+
+def view_spacing(part: Solid) -> float:
+    """Spacing at which a view of a solid has about as many points as a sample of all of it."""
+    return part.spacing * (1.0 if part.boundaries or part.name == "thin_plate" else 0.8)
 
 
 @cache

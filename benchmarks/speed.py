@@ -1,4 +1,7 @@
-"""Times of edgel and its rivals, interleaved in one run, medians of at least five rounds."""
+"""Times of edgel and its rivals, interleaved in one run, medians of at least five rounds.
+
+Run: python benchmarks/speed.py for the frames alone (part of make bench, which measures all).
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,8 @@ from typing import Any
 
 import fittings
 import numpy as np
+import real_frames
+from report_tables import frame_times
 from rivals import NORMALS, RIVALS
 
 import edgel
@@ -67,6 +72,68 @@ def edges(sizes: Sequence[int], slowest: float = SLOWEST) -> list[dict[str, Any]
     return _over_sizes("edges", sizes, work, slowest)
 
 
+def frame_clouds() -> dict[str, tuple[edgel.Cloud, float]]:
+    """Organized clouds in millimetres and their spacing: a real frame, a simulated one as large, the tee from above.
+
+    And the tee as the other tables have it, a list of points.
+    """
+    real = real_frames.load(real_frames.FOLDER / "primesense.npz").cloud
+    real = edgel.Cloud(1000 * real.xyz, shape=real.shape, viewpoint=np.zeros(3))
+    assert real.shape is not None
+    across = np.linalg.norm(np.diff(real.xyz.reshape(*real.shape, 3), axis=1), axis=2)
+    tee = fittings.scan(synth.tee())
+    part, above = synth.stepped_block(), synth.tee()
+    seen = synth.sense(part, synth.SENSORS["kinect"], spacing=0.24)
+    parallel = synth.view(above, spacing=1.22 * tee.spacing, direction=(0, 0, -1), roll=0.0)
+    return {
+        f"PrimeSense, {real.shape[1]} x {real.shape[0]}": (real, float(np.nanmedian(across))),
+        f"simulated Kinect, {size_of(seen.cloud)}": (seen.cloud, seen.spacing),
+        f"tee, parallel view, {size_of(parallel.cloud)}": (parallel.cloud, parallel.spacing),
+        "tee, list of points": (tee.cloud, tee.spacing),
+    }
+
+
+def size_of(cloud: edgel.Cloud) -> str:
+    assert cloud.shape is not None
+    return f"{cloud.shape[1]} x {cloud.shape[0]}"
+
+
+def frames(rounds: int = ROUNDS) -> list[dict[str, Any]]:
+    """The default on organized clouds against PCL's organized edges, and on all against Open3D's normals of all points.
+
+    PCL's has its documented thresholds and either of its common normals; of gradients they are the fastest. A parallel view it takes as one
+    from afar; a list of points it cannot take.
+    """
+    pcl = next(rival for rival in RIVALS if rival.name == "PCL organized")
+    ours = next(rival for rival in RIVALS if rival.name == "edgel default")
+    open3d = next(rival for rival in NORMALS if rival.name == "Open3D")
+    rows = []
+    for name, (cloud, spacing) in frame_clouds().items():
+        finite = cloud.xyz[np.isfinite(cloud.xyz).all(axis=1)]
+        work: dict[str, Callable[[], float]] = {
+            ours.name: lambda cloud=cloud, spacing=spacing: ours.run(cloud, spacing, ours.defaults).seconds
+        }
+        if cloud.is_organized and pcl.missing() is None:
+            for method in ("gradient", "covariance"):
+                options = {**pcl.defaults, "method": method}
+                work[f"{pcl.name}, {method}"] = lambda cloud=cloud, spacing=spacing, options=options: (
+                    pcl.run(cloud, spacing, options).seconds
+                )
+        if open3d.missing() is None:
+            work["Open3D, normals"] = lambda finite=finite: open3d.run(finite, 16)[1]
+        for method, each in interleaved(work, rounds).items():
+            rows.append(
+                {
+                    "frame": name,
+                    "method": method,
+                    "points": len(finite),
+                    "seconds": float(np.median(each)),
+                    "rounds": each,
+                }
+            )
+    return rows
+
+
 def stages(rounds: int = ROUNDS) -> list[dict[str, Any]]:
     """Stages of the published method and of the default one on the tee as the paper has it."""
     points = fittings.scan(synth.tee()).cloud.xyz
@@ -100,3 +167,7 @@ def _over_sizes(
         expected = {name: seconds if name in pieces else float("inf") for name, seconds in expected.items()}
         before = size
     return rows
+
+
+if __name__ == "__main__":
+    print(frame_times(frames()))

@@ -34,6 +34,8 @@ def test_the_benchmarks_scenes_hold_every_level(scenes):
     assert not {name.split("/")[0] for name in scenes.TUNE} & set(scenes.SHAPES)
     assert set(scenes.QUICK) <= set(scenes.TEST)
     assert set(scenes.PICTURES) <= set(scenes.TEST)
+    assert not set(scenes.SENSED) & {*scenes.TEST, *scenes.TUNE}
+    assert {name.split("/")[1] for name in scenes.SENSED} == {"kinect", "stereo", "spinning"}
     assert len(scenes.PICTURES) >= 5
     assert len({shape for shape, *_ in parts}) == 17
     for seen in (*scenes.VIEWS, *scenes.PATTERNS):
@@ -44,7 +46,7 @@ def test_the_benchmarks_scenes_hold_every_level(scenes):
         assert {o for s, _, _, o in parts if s == shape} == {"o0", "o1", "o5"}
 
 
-@pytest.mark.parametrize("name", ["frustum/spherical/n0.3/o5", "pyramid/graded2/n0.1/o1"])
+@pytest.mark.parametrize("name", ["frustum/spherical/n0.3/o5", "pyramid/graded2/n0.1/o1", "frustum/kinect/n0/o0"])
 def test_a_name_is_a_scene(scenes, name):
     made, stored, again = scenes.make(name), scenes.load(name), scenes.load(name)
     for one in (stored, again):
@@ -59,7 +61,9 @@ def test_a_name_is_a_scene(scenes, name):
     assert (stored.depth is None) == (made.depth is None)
 
 
-@pytest.mark.parametrize("name", ["frustum", "frustum/top/n0/o0", "cow/pinhole/n0/o0", "frustum/pinhole/nx/o0"])
+@pytest.mark.parametrize(
+    "name", ["frustum", "frustum/top/n0/o0", "cow/pinhole/n0/o0", "frustum/pinhole/nx/o0", "frustum/kinect/n1/o0"]
+)
 def test_other_names_are_refused(scenes, name):
     with pytest.raises(ValueError, match=re.escape("name:")):
         scenes.load(name)

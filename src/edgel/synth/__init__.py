@@ -17,6 +17,7 @@ from edgel.synth.fittings import elbow, tee
 from edgel.synth.polyhedra import blocks, cube_fractal, frustum, ridge, stepped_block, thin_plate, wedge_fan
 from edgel.synth.sample import PATTERNS, poisson_disc, sample
 from edgel.synth.scan import scan
+from edgel.synth.sensors import SENSORS, Sensor, sense
 from edgel.synth.solid import Solid, from_patches, from_polygons, make_solid
 from edgel.synth.truth import Scene, TrueEdges
 from edgel.synth.view import PROJECTIONS, view
@@ -25,9 +26,11 @@ __all__ = [
     "EDGE_KINDS",
     "PATTERNS",
     "PROJECTIONS",
+    "SENSORS",
     "EdgeCurve",
     "NearestEdge",
     "Scene",
+    "Sensor",
     "Solid",
     "TrueEdges",
     "bezier_ridge",
@@ -49,6 +52,7 @@ __all__ = [
     "round_corners",
     "sample",
     "scan",
+    "sense",
     "sphere",
     "stepped_block",
     "tee",
