@@ -94,7 +94,8 @@ def as_intrinsics(camera: Any) -> Intrinsics:
         raise TypeError("intrinsics: expected a camera, got a path or text; read it by edgel.io.read_intrinsics(path)")
     if isinstance(camera, list | tuple) or hasattr(camera, "__array__"):
         numbers = _array(camera, "intrinsics")
-        return Intrinsics(*(numbers if numbers.shape == (4,) else _matrix(numbers, "intrinsics")))
+        fx, fy, cx, cy = numbers if numbers.shape == (4,) else _matrix(numbers, "intrinsics")
+        return Intrinsics(fx, fy, cx, cy)
     if isinstance(camera, Mapping):
         return _of_entries({str(key).lstrip("_"): value for key, value in camera.items()})
     entries = {name: getattr(camera, name) for name in _ATTRIBUTES if hasattr(camera, name)}
