@@ -440,3 +440,14 @@ def balance(points, normal, other, inlier):
     beside = points[np.abs(points @ normal) < inlier] @ across
     sides = (beside > 0.4).sum(), (beside < -0.4).sum()
     return min(sides) / max(*sides, 1)
+
+
+def back_project(depth, scale, fx, fy, cx, cy):
+    """The pinhole camera: points (H, W, 3) of depths (H, W), NaN where there is none."""
+    xyz = np.full((*depth.shape, 3), math.nan)
+    for row, line in enumerate(depth.tolist()):
+        for col, count in enumerate(line):
+            z = count * scale
+            if 0 < z < math.inf:
+                xyz[row, col] = (col - cx) / fx * z, (row - cy) / fy * z, z
+    return xyz

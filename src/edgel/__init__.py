@@ -5,7 +5,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from edgel import paper
+    from edgel._depth import from_depth
     from edgel._detect import detect
+    from edgel._intrinsics import Intrinsics
     from edgel._neighbors.normals import Normals, estimate_normals
     from edgel.cloud import Cloud
     from edgel.edges import EdgeKind, Edges
@@ -18,9 +20,11 @@ __all__ = [
     "EdgeKind",
     "Edges",
     "FormatError",
+    "Intrinsics",
     "Normals",
     "detect",
     "estimate_normals",
+    "from_depth",
     "paper",
     "read",
     "write",
@@ -33,9 +37,11 @@ _HOMES = {
     "EdgeKind": "edgel.edges",
     "Edges": "edgel.edges",
     "FormatError": "edgel.io",
+    "Intrinsics": "edgel._intrinsics",
     "Normals": "edgel._neighbors.normals",
     "detect": "edgel._detect",
     "estimate_normals": "edgel._neighbors.normals",
+    "from_depth": "edgel._depth",
     "read": "edgel.io",
     "write": "edgel.io",
 }

@@ -12,9 +12,10 @@ from typing import Any, BinaryIO, NoReturn
 
 import numpy as np
 
+from edgel._intrinsics import Intrinsics
 from edgel.cloud import Cloud
 from edgel.io import depth, e57, e57_write, npy, pcd, ply, text, text_write
-from edgel.io.depth import Intrinsics, read_intrinsics
+from edgel.io.depth import read_intrinsics
 from edgel.io.errors import FormatError, printable
 from edgel.io.files import check_readable, describe
 
@@ -71,9 +72,7 @@ _NOT_CLOUDS = {
 }
 
 
-def read(
-    path: str | os.PathLike[str] | BinaryIO, *, intrinsics: Intrinsics | str | os.PathLike[str] | None = None
-) -> Cloud:
+def read(path: str | os.PathLike[str] | BinaryIO, *, intrinsics: Any = None) -> Cloud:
     """Read a point cloud; the extension tells the format, the content is checked.
 
     Parameters
@@ -81,8 +80,8 @@ def read(
     path : path or binary file
         PLY, PCD, LAS, LAZ (COPC too), XYZ, TXT, CSV, ASC, PTS, NPY, NPZ, E57, or a depth image (PNG, TIFF, NPY). An
         open binary file (``sys.stdin.buffer``) is read as PLY.
-    intrinsics : Intrinsics or path, optional
-        The camera of a depth image, or the JSON file that holds it; see `edgel.io.depth.read`.
+    intrinsics : Intrinsics, path, or another camera, optional
+        The camera of a depth image (see `edgel.from_depth`), or the JSON file that holds it (see `read_intrinsics`).
 
     Returns
     -------
@@ -111,7 +110,7 @@ def read(
         return _read(path, intrinsics)
 
 
-def _read(path: str | os.PathLike[str] | BinaryIO, intrinsics: Intrinsics | str | os.PathLike[str] | None) -> Cloud:
+def _read(path: str | os.PathLike[str] | BinaryIO, intrinsics: Any) -> Cloud:
     if not isinstance(path, (str, os.PathLike)):
         _check_stream(path, "read")
         return ply.read(path)

@@ -1,16 +1,16 @@
-"""Depth images (16-bit PNG or TIFF, float TIFF, .npy) and the camera that took them."""
+"""Files of depth images (16-bit PNG or TIFF, float TIFF, .npy) and of the cameras that took them."""
 
 from __future__ import annotations
 
 import json
-import math
 import os
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from edgel._depth import from_depth
+from edgel._intrinsics import Intrinsics, as_intrinsics
 from edgel.cloud import Cloud
 from edgel.io.arrays import read_array
 from edgel.io.errors import FormatError
@@ -21,57 +21,17 @@ from edgel.io.picture import read_picture
 _LONGEST_JSON = 1 << 20
 
 
-@dataclass(frozen=True)
-class Intrinsics:
-    """The pinhole camera of a depth image.
-
-    Attributes
-    ----------
-    fx, fy : float
-        Focal lengths, pixels.
-    cx, cy : float
-        Principal point, pixels; the centre of the first pixel is (0, 0).
-    depth_scale : float or None
-        Cloud units in one count of the image; None: 0.001 for integers (millimetres to metres), 1 for floats.
-    width, height : int or None
-        Size of the image that they belong to, checked when known.
-
-    Examples
-    --------
-    >>> Intrinsics(fx=525, fy=525, cx=319.5, cy=239.5).cx
-    319.5
-    """
-
-    fx: float
-    fy: float
-    cx: float
-    cy: float
-    depth_scale: float | None = None
-    width: int | None = None
-    height: int | None = None
-
-    def __post_init__(self) -> None:
-        for name in ("fx", "fy", "cx", "cy", "depth_scale"):
-            value = getattr(self, name)
-            if value is None and name == "depth_scale":
-                continue
-            if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not math.isfinite(value):
-                raise ValueError(f"{name}: expected a finite number, got {value!r}")
-            if name not in ("cx", "cy") and value <= 0:
-                raise ValueError(f"{name}: expected a number above 0, got {value!r}")
-
-
 def read_intrinsics(path: str | os.PathLike[str]) -> Intrinsics:
     """Read camera intrinsics from a JSON file.
 
     Understood are ``fx fy cx cy`` (also with a leading underscore, as the perception library's .intr files have them),
     a 3 x 3 ``camera_matrix``, ``K`` or ``intrinsic_matrix`` of rows or of nine numbers (Open3D's, column by column),
-    and beside them ``width``, ``height`` and ``depth_scale``.
+    beside them ``width``, ``height`` and ``depth_scale``, and whatever else `edgel.from_depth` takes for a camera.
 
     Raises
     ------
     FormatError
-        If the file is no JSON, or no camera is in it, or the camera has skew.
+        If the file is no JSON, or there is no camera in it, or several, or one with lens distortion or skew.
 
     Examples
     --------
@@ -93,55 +53,26 @@ def read_intrinsics(path: str | os.PathLike[str]) -> Intrinsics:
         raise FormatError(
             f"{name}: not a JSON file of camera intrinsics ({error}); fx, fy, cx and cy are needed"
         ) from None
-    if not isinstance(entries, dict):
+    if not isinstance(entries, dict | list):
         raise FormatError(
             f"{name}: holds {type(entries).__name__}, not camera intrinsics; fx, fy, cx and cy are needed"
         )
-    # Open3D nests the camera of a recording one level down.
-    nested = entries.get("intrinsic")
-    camera = {key.lstrip("_"): value for key, value in (nested if isinstance(nested, dict) else entries).items()}
     try:
-        fx, fy, cx, cy, skew = _camera(camera)
-        if skew:
-            raise FormatError(f"{name}: the camera has skew {skew}; undistort the image to a camera without")
-        size = [int(camera[key]) if camera.get(key) is not None else None for key in ("width", "height")]
-        return Intrinsics(fx, fy, cx, cy, camera.get("depth_scale"), size[0], size[1])
-    except FormatError:
-        raise
-    except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
-        raise FormatError(
-            f"{name}: no usable camera intrinsics in it ({error}); fx, fy, cx and cy are needed"
-        ) from None
+        return as_intrinsics(entries)
+    except (TypeError, ValueError, RecursionError) as error:
+        raise FormatError(f"{name}: {str(error).removeprefix('intrinsics: ')}") from None
 
 
-def _camera(camera: dict[str, Any]) -> tuple[float, float, float, float, float]:
-    if "fx" in camera:
-        fx, fy, cx, cy = (float(camera[key]) for key in ("fx", "fy", "cx", "cy"))
-        return fx, fy, cx, cy, float(camera.get("skew") or 0)
-    for key in ("camera_matrix", "K", "intrinsic_matrix"):
-        if key in camera:
-            matrix = (
-                camera[key]["data"] if isinstance(camera[key], dict) else camera[key]
-            )  # OpenCV and ROS: under "data"
-            flat = np.asarray(matrix, np.float64)
-            if flat.shape not in ((9,), (3, 3)):
-                raise ValueError(f"{key} has shape {flat.shape}")
-            k = flat.reshape(3, 3)
-            k = k.T if k[2, 0] or k[2, 1] else k  # column by column: the principal point lies in the last row
-            return k[0, 0], k[1, 1], k[0, 2], k[1, 2], k[0, 1]
-    raise KeyError("neither fx nor camera_matrix, K or intrinsic_matrix")
-
-
-def read(path: str | os.PathLike[str], *, intrinsics: Intrinsics | str | os.PathLike[str] | None = None) -> Cloud:
+def read(path: str | os.PathLike[str], *, intrinsics: Any = None) -> Cloud:
     """Read a depth image as an organized cloud in the camera's frame: x right, y down, z forward.
 
     Parameters
     ----------
     path : path
         PNG or TIFF of one 16-bit, 32-bit or float channel, or .npy (H, W).
-    intrinsics : Intrinsics or path, optional
-        The camera, or the JSON file that holds it (see `read_intrinsics`). Without it the one ``*.intr`` or
-        ``intrinsics.json`` in the image's folder is used, if there is exactly one.
+    intrinsics : Intrinsics, path, or another camera, optional
+        The camera (see `edgel.from_depth`), or the JSON file that holds it (see `read_intrinsics`). Without it the one
+        ``*.intr`` or ``intrinsics.json`` in the image's folder is used, if there is exactly one.
 
     Returns
     -------
@@ -165,24 +96,11 @@ def read(path: str | os.PathLike[str], *, intrinsics: Intrinsics | str | os.Path
     name = os.fspath(path)
     image = _read_image(name)
     camera = _find_intrinsics(name) if intrinsics is None else intrinsics
-    if not isinstance(camera, Intrinsics):
-        camera = read_intrinsics(camera)
-    height, width = image.shape
-    if camera.width not in (None, width) or camera.height not in (None, height):
-        raise FormatError(
-            f"{name}: the image is {width} x {height}, the intrinsics are for {camera.width} x {camera.height}; "
-            "pass those of this image"
-        )
-    scale = camera.depth_scale or (1.0 if image.dtype.kind == "f" else 0.001)
-    rows, cols = np.arange(height)[:, None], np.arange(width)
-    xyz = np.empty((height, width, 3))
-    with np.errstate(over="ignore", invalid="ignore"):  # an absurd depth becomes infinite: a point that is not there
-        z = image * np.float64(scale)
-        z[~(np.isfinite(z) & (z > 0))] = np.nan
-        xyz[..., 2] = z
-        np.multiply((cols - camera.cx) / camera.fx, z, out=xyz[..., 0])
-        np.multiply((rows - camera.cy) / camera.fy, z, out=xyz[..., 1])
-    return Cloud(xyz, viewpoint=np.zeros(3))
+    camera = read_intrinsics(camera) if isinstance(camera, str | os.PathLike) else as_intrinsics(camera)
+    try:
+        return from_depth(image, camera)
+    except ValueError as error:  # of another size than the camera's
+        raise FormatError(f"{name}: {error}") from None
 
 
 def _read_image(path: str) -> np.ndarray:
