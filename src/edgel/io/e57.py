@@ -44,9 +44,9 @@ def read(path: str | os.PathLike[str]) -> Cloud:
         Cartesian or spherical coordinates as x, y, z in the file's frame (metres). Numeric fields become attributes by
         their names (``colorRed`` as ``red`` and so on; those of an extension keep its prefix); a field that only some
         scans have is NaN or 0 in the others. ``scan_index`` tells the scan when there are several. Of one scan the
-        scanner's position is the viewpoint, if it has a pose or spherical coordinates, and rowIndex and columnIndex make
-        the cloud organized, unless they name a cell twice or leave more than 20 empty for each point: cells that are
-        not in the file are NaN (attributes that have no NaN: 0). Points the scanner marked invalid are NaN in an
+        scanner's position is the viewpoint, if it has a pose or spherical coordinates, and rowIndex and columnIndex
+        make the cloud organized, unless they name a cell twice or leave more than 20 empty for each point: cells that
+        are not in the file are NaN (attributes that have no NaN: 0). Points the scanner marked invalid are NaN in an
         organized cloud and left out otherwise; their number is ``metadata["e57_num_invalid"]``.
 
     Raises
