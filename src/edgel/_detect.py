@@ -12,7 +12,7 @@ from edgel._labels import LIKELY, label_edges, strength_of_contrast
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.normals import check_num_neighbors, fit_planes, towards
 from edgel._neighbors.queries import at_points
-from edgel._range_image import METHODS, choose_view
+from edgel._range_image import METHODS, choose_view, without_no_return
 from edgel._scale import at_scale, check_scale
 from edgel._stages import Stages
 from edgel._surface import classify, cloud_statistics, localize, screen
@@ -87,7 +87,8 @@ def detect(
         return at_scale(detect, points, scale, progress=progress, viewpoint=viewpoint, **options)
     cloud, stages = as_cloud(points), Stages(progress)
     viewpoint = cloud.viewpoint if viewpoint is None else as_vector(viewpoint, "viewpoint")
-    finite = check_points(cloud)
+    checked = check_points(cloud)
+    finite, missing = without_no_return(cloud, checked, viewpoint)
     xyz, k = finite.xyz, check_num_neighbors(num_neighbors, len(finite.xyz))
     colors = _channels(cloud, finite) if EdgeKind.COLOR in kinds else None
 
@@ -116,10 +117,10 @@ def detect(
         kind=kind[edge],
         strength=labels.strength[edge],
         **vars(faces),
-        num_points=finite.num_input,
-        num_dropped=finite.num_dropped,
+        num_points=checked.num_input,
+        num_dropped=checked.num_dropped,
         method=view.method,
-        reason=view.reason,
+        reason=view.reason + missing,
         parameters={"min_strength": min_strength, "num_neighbors": k},
         seconds=stages.seconds,
     )

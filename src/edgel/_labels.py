@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from edgel._range_image import View, outlines
+from edgel._range_image import View, outlines, sides
 from edgel._surface import Classification
 from edgel.edges import EdgeKind
 
@@ -42,7 +42,9 @@ def label_edges(classified: Classification, view: View, xyz: np.ndarray) -> Labe
     labels = Labels(len(xyz))
     labels.add(classified.points, EdgeKind.CREASE, strength_of_probability(classified.crease))
     if view.image is None:
-        labels.add(classified.points, EdgeKind.BOUNDARY, strength_of_probability(classified.outline))
+        direction, points = view.direction, classified.points
+        kind = EdgeKind.BOUNDARY if direction is None else sides(xyz, direction, points)
+        labels.add(points, kind, strength_of_probability(classified.outline))
     else:
         outline = outlines(view.image, xyz)
         labels.add(np.arange(len(xyz)), outline.kind, outline.strength)

@@ -5,7 +5,8 @@ import pytest
 from test_range_image import camera, grid, sphere
 
 from edgel import Cloud
-from edgel._range_image.view import best_view, count_rings
+from edgel._range_image.rings import find_rings
+from edgel._range_image.view import best_view
 
 
 def hill():
@@ -14,12 +15,19 @@ def hill():
     return xyz
 
 
+def shaken(xyz, by=0.3):
+    return xyz + np.random.default_rng(2).normal(0, by, xyz.shape)
+
+
 @pytest.mark.parametrize(
     ("cloud", "method"),
     [
         (Cloud(camera()), "organized"),
-        (Cloud(hill()), "surface"),
-        (Cloud(camera().reshape(-1, 3), viewpoint=np.zeros(3)), "pinhole"),
+        (Cloud(hill()), "organized"),
+        (Cloud(shaken(hill())), "surface"),
+        (Cloud(camera().reshape(-1, 3)), "organized"),
+        (Cloud(camera().reshape(-1, 3), viewpoint=np.zeros(3)), "organized"),
+        (Cloud(shaken(camera().reshape(-1, 3)), viewpoint=np.zeros(3)), "pinhole"),
         (Cloud(sphere(), viewpoint=np.array([0.2, 0.1, 0.0])), "spherical"),
         (Cloud(sphere(), viewpoint=np.array([0.0, 0.0, 50.0])), "surface"),
         (Cloud(sphere()), "surface"),
@@ -52,9 +60,10 @@ def test_a_spinning_sensor_is_known_by_its_rings(empty):
 
 
 def test_no_rings_where_there_are_none():
-    rng = np.random.default_rng(1)
-    assert count_rings(rng.standard_normal((20000, 3))) == 0
-    assert count_rings(grid(200, 200).reshape(-1, 3) + (1.0, 1.0, 5.0)) == 0
-    assert count_rings(sweep()[:500]) == 0  # too few to tell
+    rng, eye = np.random.default_rng(1), np.zeros(3)
+    assert find_rings(rng.standard_normal((20000, 3)), eye) is None
+    assert find_rings(grid(200, 200).reshape(-1, 3) + (1.0, 1.0, 5.0), eye) is None
+    assert find_rings(sweep()[:500], eye) is None  # too few to tell
     flat = np.column_stack([rng.uniform(-50, 50, (20000, 2)), 0.1 * rng.standard_normal(20000)])
-    assert count_rings(np.concatenate([flat, rng.uniform(-60, 60, (200, 3))])) == 0  # outliers all round are no rings
+    outliers = np.concatenate([flat, rng.uniform(-60, 60, (200, 3))])
+    assert find_rings(outliers, eye) is None  # all round, but no rings
