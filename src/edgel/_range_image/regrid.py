@@ -13,8 +13,7 @@ from edgel._range_image.range_image import FRAME, RangeImage
 _OWN = 0.98  # least share of the points that have a place of the grid to themselves
 _BESIDE = 0.6  # least share of the places beside points that are filled too: a grid, not points on round numbers
 _EMPTIEST = 20  # cells for each point
-EXACT = 0.05  # steps: of parallel rays a point lies as near as that to its place
-DOWN = np.array([0.0, 0.0, -1.0])
+EXACT = 0.15  # steps: of parallel rays a point lies as near as that to its place
 _LEVEL = 1e-9  # rays less far from their axis have no azimuth
 _AXES = {"z": (0, 1, 2), "y": (2, 0, 1)}  # which coordinates are x, y and z about these axes of a scanner
 
@@ -40,22 +39,46 @@ class Grid:
     shape: tuple[int, int]
     off: float = 0.0
 
-    def seen(self, xyz: np.ndarray, method: str, viewpoint: np.ndarray | None) -> RangeImage:
-        """See the points (N, 3) in this grid, from a viewpoint or (None) looking down; the others do not show."""
-        shape = self.shape[0] + 2 * FRAME, self.shape[1] + 2 * FRAME
-        index = np.full(shape, -1)
-        index[self.cells // self.shape[1] + FRAME, self.cells % self.shape[1] + FRAME] = self.points
-        if viewpoint is None:
-            direction, depth, across = DOWN, -xyz[:, 2], xyz * (1, 1, 0)
-        else:
-            rays = xyz - viewpoint
-            depth = np.linalg.norm(rays, axis=1)
-            across = rays / np.where(depth > 0, depth, 1)[:, None]
-            direction = across[self.points].mean(axis=0)
-            direction = direction / np.linalg.norm(direction)
+    def seen_along(self, xyz: np.ndarray, from_below: bool) -> RangeImage:
+        """See the points (N, 3) from above or below, void all around the grid: the surface ends where the map does."""
+        direction = np.array([0.0, 0.0, 1.0 if from_below else -1.0])
+        across = xyz * (1, 1, 0)
+        return self._seen(xyz @ direction, across, "organized", None, direction, [FRAME] * 4)
+
+    def seen_from(self, xyz: np.ndarray, method: str, viewpoint: np.ndarray) -> RangeImage:
+        """See the points (N, 3) from the viewpoint of their sensor.
+
+        A side of the grid of which the points fill more than half is where the sensor's field of view ends, and no edge
+        of the surface; around the others there is void.
+        """
+        rays = xyz - viewpoint
+        depth = np.linalg.norm(rays, axis=1)
+        rays /= np.where(depth > 0, depth, 1)[:, None]
+        middle = rays[self.points].mean(axis=0)
+        length = np.linalg.norm(middle)
+        middle = middle / length if length > 0 else np.array([0.0, 0.0, 1.0])
+        row, col = np.divmod(self.cells, self.shape[1])
+        (last_row, last_col), (height, width) = np.array(self.shape) - 1, self.shape
+        filled = [(row == 0, width), (row == last_row, width), (col == 0, height), (col == last_col, height)]
+        void = [0 if np.count_nonzero(on) > long / 2 else FRAME for on, long in filled]
+        return self._seen(depth, rays, method, viewpoint, middle, void)
+
+    def _seen(
+        self,
+        depth: np.ndarray,
+        across: np.ndarray,
+        method: str,
+        viewpoint: np.ndarray | None,
+        direction: np.ndarray,
+        void: list[int],
+    ) -> RangeImage:
+        """Fill an image, pixels of void above, below, left and right, from depths (N,) and places across (N, 3)."""
+        top, bottom, left, right = void
+        index = np.full((self.shape[0] + top + bottom, self.shape[1] + left + right), -1)
+        index[self.cells // self.shape[1] + top, self.cells % self.shape[1] + left] = self.points
         steps = [np.linalg.norm(across[b] - across[a], axis=1) for a, b in neighbours(index)]
         image = np.where(index >= 0, depth[index], np.nan)
-        behind = np.full(len(xyz), np.inf)
+        behind = np.full(len(depth), np.inf)
         behind[self.points] = 0.0
         return RangeImage(image, index, method, (pitch_of(steps[0]), pitch_of(steps[1])), viewpoint, direction, behind)
 
@@ -87,8 +110,10 @@ def camera_grid(xyz: np.ndarray, viewpoint: np.ndarray) -> Grid | None:
     return _filled(xyz, ahead, picture, np.linalg.norm(rays, axis=1))
 
 
-def map_grid(xyz: np.ndarray) -> Grid | None:
+def map_grid(xyz: np.ndarray, *, from_below: bool = False) -> Grid | None:
     """Find the grid of a height map, whose points lie at equal steps of x and of y, each place used once.
+
+    Where a few places are used twice the points nearer to the viewer show, from above or below.
 
     Examples
     --------
@@ -97,7 +122,7 @@ def map_grid(xyz: np.ndarray) -> Grid | None:
     >>> grid is not None and grid.shape
     (20, 30)
     """
-    return _filled(xyz, np.arange(len(xyz)), xyz[:, :2], -xyz[:, 2], EXACT)
+    return _filled(xyz, np.arange(len(xyz)), xyz[:, :2], xyz[:, 2] if from_below else -xyz[:, 2], EXACT)
 
 
 def scanner_grid(xyz: np.ndarray, viewpoint: np.ndarray) -> Grid | None:

@@ -11,7 +11,7 @@ from edgel._neighbors.kdtree import NeighborIndex
 from edgel._range_image.range_image import RangeImage, organized, orthographic, pinhole, spherical
 from edgel._range_image.regrid import camera_grid, map_grid, scanner_grid
 from edgel._range_image.rings import find_rings
-from edgel._range_image.sides import SHOWN
+from edgel._range_image.sides import SHOWN, explaining_direction
 from edgel.cloud import Cloud, Points
 
 METHODS = ("auto", "surface", "organized", "orthographic", "pinhole", "spherical")
@@ -100,15 +100,16 @@ def _sensor_view(xyz: np.ndarray, viewpoint: np.ndarray | None) -> View | None:
     """
     where = "origin" if viewpoint is None else "viewpoint"
     eye = np.zeros(3) if viewpoint is None else viewpoint
+    below = viewpoint is not None and viewpoint[2] < np.median(xyz[:, 2])
     if (rings := find_rings(xyz, eye)) is not None:
         grid = rings.grid(xyz, eye)
-        image = _from_viewpoint(spherical, xyz, eye) if grid is None else grid.seen(xyz, "spherical", eye)
+        image = _from_viewpoint(spherical, xyz, eye) if grid is None else grid.seen_from(xyz, "spherical", eye)
         reason = f"the points lie on {rings.count} rings about the {where}, as those of a spinning sensor there"
         return View("spherical", reason, image)
     found = [
         (grid, name, stands)
         for grid, name, stands in (
-            (map_grid(xyz), "a height map", None),
+            (map_grid(xyz, from_below=below), "a height map", None),
             (camera_grid(xyz, eye), f"a camera at the {where}", eye),
             (scanner_grid(xyz, eye), f"a scanner at the {where}", eye),
         )
@@ -118,7 +119,8 @@ def _sensor_view(xyz: np.ndarray, viewpoint: np.ndarray | None) -> View | None:
         return None
     grid, name, stands = min(found, key=lambda each: round(each[0].off, _DIGITS))
     reason = f"the points lie on the grid of {name}, {grid.shape[0]} x {grid.shape[1]}"
-    return View("organized", reason, grid.seen(xyz, "organized", stands))
+    image = grid.seen_along(xyz, below) if stands is None else grid.seen_from(xyz, "organized", stands)
+    return View("organized", reason, image)
 
 
 def _from_viewpoint(project: Callable[..., RangeImage], xyz: np.ndarray, viewpoint: np.ndarray) -> RangeImage:
@@ -154,13 +156,13 @@ def choose_view(cloud: Cloud, finite: Points, index: NeighborIndex, method: str,
     xyz = finite.xyz
     view = best_view(cloud, xyz, viewpoint) if method == "auto" else View(method, "asked for")
     if view.method == "surface" and viewpoint is None:
-        direction, share = _best_direction(xyz, index.at(index.evenly_sampled(_FEW)), None)
-        return replace(view, direction=direction if share >= SHOWN else None)
+        sample = index.at(index.evenly_sampled(_FEW))
+        return replace(view, direction=explaining_direction(sample, _directions(sample)))
     if view.image is not None or view.method == "surface":
         return view
     if view.method == "orthographic":
         sample = index.at(index.evenly_sampled(_SAMPLE))
-        image = orthographic(xyz, _best_direction(xyz, sample, viewpoint)[0])
+        image = orthographic(xyz, _best_direction(xyz, sample, viewpoint))
     elif view.method == "organized":
         if cloud.shape is None or min(cloud.shape) < 2:
             raise ValueError("method: 'organized' needs points in a grid, (H, W, 3); use 'auto' for a list of points")
@@ -172,8 +174,8 @@ def choose_view(cloud: Cloud, finite: Points, index: NeighborIndex, method: str,
     return View(view.method, view.reason, image)
 
 
-def _best_direction(xyz: np.ndarray, sample: np.ndarray, viewpoint: np.ndarray | None) -> tuple[np.ndarray, float]:
-    """Return the direction whose orthographic view of a sample (M, 3) of the points shows most of it, and how much."""
+def _best_direction(xyz: np.ndarray, sample: np.ndarray, viewpoint: np.ndarray | None) -> np.ndarray:
+    """Return the direction whose orthographic view of a sample (M, 3) of the points shows most of it."""
     best, most = np.array([0.0, 0.0, -1.0]), -1.0
     for direction in _directions(xyz):
         if viewpoint is not None and direction @ (xyz.mean(axis=0) - viewpoint) < 0:
@@ -181,7 +183,7 @@ def _best_direction(xyz: np.ndarray, sample: np.ndarray, viewpoint: np.ndarray |
         share = shown(orthographic(sample, direction))
         if share > most + 1e-3:  # earlier candidates, the view from above first, win a draw
             best, most = direction, share
-    return best, most
+    return best
 
 
 def shown(image: RangeImage) -> float:

@@ -236,8 +236,8 @@ def _cells(scan: _Scan) -> tuple[np.ndarray, tuple[int, int]] | None:
     if any(name not in scan.attributes or not len(scan.xyz) for name in GRID):
         return None
     row, col = (scan.attributes[name].astype(np.int64) for name in GRID)
-    low, high = (np.array([int(of(row)), int(of(col))], object) for of in (np.min, np.max))
-    shape = tuple(int(count) for count in high - low + 1)
+    low = int(row.min()), int(col.min())
+    shape = int(row.max()) - low[0] + 1, int(col.max()) - low[1] + 1
     if min(shape) < 2 or shape[0] * shape[1] > _EMPTIEST * len(row):
         return None
     index = np.full(shape[0] * shape[1], -1)
