@@ -14,7 +14,7 @@ SHOWN = 0.97  # least share of the points that the direction has to show
 _DEPTH = 3.0  # spacings behind the nearest point of its pixel within which a point still shows
 _REACH = 2  # pixels: what is beside an outline lies as near as that
 _GAP = 3.0  # spacings: least gap among the depths around an outline point
-_FAR = 2 * _REACH + 3  # least number of depths beyond the gap
+_FAR = 2 * _REACH + 2  # least number of depths beyond the gap
 _MOST_PIXELS = 50  # for each point
 
 
