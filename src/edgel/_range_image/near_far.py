@@ -14,7 +14,7 @@ SHOWN = 0.97  # least share of the points that the direction has to show
 _DEPTH = 3.0  # spacings behind the nearest point of its pixel within which a point still shows
 _REACH = 2  # pixels: what is beside an outline lies as near as that
 _GAP = 3.0  # spacings: least gap among the depths around an outline point
-_FAR = 2 * _REACH + 2  # least number of depths beyond the gap
+_FAR = 2 * _REACH + 1  # least number of depths beyond the gap
 _MOST_PIXELS = 50  # for each point
 
 
@@ -56,7 +56,7 @@ def sides(xyz: np.ndarray, direction: np.ndarray, points: np.ndarray) -> np.ndar
     around = np.sort(around, axis=1)  # over a slope depths follow each other
     filled = np.isfinite(around)
     gap = np.where(filled[:, 1:], np.diff(np.where(filled, around, 0), axis=1), 0)
-    # A rim that bends away from the viewer leaves gaps too, before one line of pixels and then nothing.
+    # A rim that bends away from the viewer leaves gaps too, before a few pixels and then nothing.
     gap[filled[:, 1:][:, ::-1].cumsum(axis=1)[:, ::-1] < _FAR] = 0
     own = own[:, None]
     nearer = np.where(around[:, 1:] <= own, gap, 0).max(axis=1)

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from edgel._neighbors.kdtree import NeighborIndex
+from edgel._range_image.near_far import SHOWN, explaining_direction
 from edgel._range_image.range_image import RangeImage, organized, orthographic, pinhole, spherical
 from edgel._range_image.regrid import camera_grid, map_grid, scanner_grid
 from edgel._range_image.rings import find_rings
-from edgel._range_image.near_far import SHOWN, explaining_direction
 from edgel.cloud import Cloud, Points
 
 METHODS = ("auto", "surface", "organized", "orthographic", "pinhole", "spherical")
