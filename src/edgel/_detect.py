@@ -9,13 +9,11 @@ import numpy as np
 
 from edgel._color import color_channels, color_edges
 from edgel._labels import LIKELY, label_edges, strength_of_contrast
-from edgel._neighbors.kdtree import build_index
-from edgel._neighbors.normals import check_num_neighbors, fit_planes, towards
-from edgel._neighbors.queries import at_points
-from edgel._range_image import METHODS, choose_view
+from edgel._neighbors.normals import check_num_neighbors
+from edgel._range_image import METHODS, choose_view, see_edges, without_no_return
 from edgel._scale import at_scale, check_scale
 from edgel._stages import Stages
-from edgel._surface import classify, cloud_statistics, localize, screen
+from edgel._surface import Surface
 from edgel.cloud import Cloud, Points, as_cloud, as_vector, check_points
 from edgel.edges import EdgeKind, Edges, as_kinds
 
@@ -87,39 +85,38 @@ def detect(
         return at_scale(detect, points, scale, progress=progress, viewpoint=viewpoint, **options)
     cloud, stages = as_cloud(points), Stages(progress)
     viewpoint = cloud.viewpoint if viewpoint is None else as_vector(viewpoint, "viewpoint")
-    finite = check_points(cloud)
+    checked = check_points(cloud)
+    finite, missing = without_no_return(cloud, checked, viewpoint)
     xyz, k = finite.xyz, check_num_neighbors(num_neighbors, len(finite.xyz))
     colors = _channels(cloud, finite) if EdgeKind.COLOR in kinds else None
 
-    with stages("index"):
-        index = build_index(xyz)
-    with stages("screening"):
-        screening = screen(index, cloud_statistics(index))
     with stages("view"):
-        view = choose_view(cloud, finite, index, method, viewpoint)
-    with stages("classification"):
-        classified = classify(index, screening)
+        view = choose_view(cloud, finite, method, viewpoint)
+    with stages("edges in the view"):
+        seen = None if view.image is None else see_edges(view.image, xyz, kinds)
+    surface = Surface(xyz, stages)
+    classified = surface.classified if seen is None or seen.is_fine(kinds) else None
     with stages("labels"):
-        labels = label_edges(classified, view, xyz)
+        labels = label_edges(xyz, classified, seen, None if viewpoint is not None else surface)
     if colors is not None:
+        normals = surface.screening.normals_of_points(surface.index)
         with stages("color"):
-            contrast = color_edges(index, xyz, screening.normals_of_points(index), colors).strength
+            contrast = color_edges(surface.index, xyz, normals, colors).strength
             labels.add(np.arange(len(xyz)), EdgeKind.COLOR, strength_of_contrast(contrast))
     with stages("localisation"):
         kind = labels.of(kinds, min_strength)
         edge = np.flatnonzero(kind)
-        planes = towards(fit_planes(index, at_points(index, edge), k), xyz[edge], viewpoint)
-        creases = classified.take((kind[classified.points] & EdgeKind.CREASE) > 0)
-        faces = localize(creases, edge, xyz, planes.normals, viewpoint)
+        faces = None if classified is None else surface.faces(edge, (kind[edge] & EdgeKind.CREASE) > 0, k, viewpoint)
+        faces = faces if seen is None else seen.faces(edge, xyz, viewpoint, faces)
     return Edges(
         index=finite.rows[edge],
         kind=kind[edge],
         strength=labels.strength[edge],
         **vars(faces),
-        num_points=finite.num_input,
-        num_dropped=finite.num_dropped,
+        num_points=checked.num_input,
+        num_dropped=checked.num_dropped,
         method=view.method,
-        reason=view.reason,
+        reason=view.reason + missing,
         parameters={"min_strength": min_strength, "num_neighbors": k},
         seconds=stages.seconds,
     )

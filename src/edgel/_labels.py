@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from edgel._range_image import View, outlines
-from edgel._surface import Classification
+from edgel._range_image import SeenEdges, explaining_view, sides
+from edgel._surface import Classification, Surface
 from edgel.edges import EdgeKind
 
 LIKELY = 0.5  # strength of an edge that is as likely as not
 EVEN = (0.45, 0.5)  # probability of an edge that is as likely as not: least, on the vaguest cloud, and most
+NOISY = 0.5  # spacings of noise from which windows in the image help neighbourhoods
+BOLD = np.radians(30.0)  # least turn of the creases that they add
 COLOR = 0.2  # contrast of a color edge that is as likely as not
 
 
@@ -37,15 +39,26 @@ class Labels:
         return np.where(self.strength >= min_strength, self.kind & np.uint8(kinds), np.uint8(0))
 
 
-def label_edges(classified: Classification, view: View, xyz: np.ndarray) -> Labels:
-    """Label the points (N, 3): creases by the surface, its outline by the view where there is one."""
+def label_edges(
+    xyz: np.ndarray, classified: Classification | None, seen: SeenEdges | None, surface: Surface | None
+) -> Labels:
+    """Label the points (N, 3): outlines by the view where there is one, creases by view or surface.
+
+    `surface`, where the sensor's place is not known: its outlines may be told apart by the direction that shows it all.
+    """
     labels = Labels(len(xyz))
-    labels.add(classified.points, EdgeKind.CREASE, strength_of_probability(classified.crease))
-    if view.image is None:
-        labels.add(classified.points, EdgeKind.BOUNDARY, strength_of_probability(classified.outline))
-    else:
-        outline = outlines(view.image, xyz)
-        labels.add(np.arange(len(xyz)), outline.kind, outline.strength)
+    if classified is not None:
+        labels.add(classified.points, EdgeKind.CREASE, strength_of_probability(classified.crease))
+    if seen is not None:
+        bold = np.ones(len(seen.creases), bool)
+        if classified is not None:  # in much noise windows find what neighbourhoods miss, but bends as well
+            bold &= (seen.noise > NOISY) & (seen.turn > BOLD)
+        labels.add(seen.creases[bold], EdgeKind.CREASE, seen.crease_strength[bold])
+        labels.add(seen.points, seen.kind, seen.strength)
+    elif classified is not None:
+        direction = None if surface is None else explaining_view(surface.index)
+        kind = EdgeKind.BOUNDARY if direction is None else sides(xyz, direction, classified.points)
+        labels.add(classified.points, kind, strength_of_probability(classified.outline))
     return labels
 
 

@@ -146,3 +146,41 @@ for i in range(300):
     command = [sys.executable, "-W", "error::RuntimeWarning", "-c", code, str(tmp_path / "a.e57")]
     done = subprocess.run(command, capture_output=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr.decode()[-2000:]
+
+
+def indexed(path, rows, cols, **more):
+    """Write a scan of points with these indices."""
+    data = {name: np.arange(len(rows)) + 1.0 for name in ("cartesianX", "cartesianY", "cartesianZ")}
+    with pye57.E57(str(path), mode="w") as e57:
+        e57.write_scan_raw({**data, "rowIndex": np.array(rows), "columnIndex": np.array(cols), **more})
+
+
+def test_a_grid_with_gaps_stays_a_grid(tmp_path):
+    file = tmp_path / "a.e57"
+    indexed(file, [7, 5, 6, 5], [3, 4, 4, 3], intensity=np.arange(4.0) + 1)
+    cloud = read(file)
+    assert cloud.shape == (3, 2)
+    np.testing.assert_array_equal(cloud.xyz[:, 0], [4, 2, np.nan, 3, 1, np.nan])
+    np.testing.assert_array_equal(cloud.attributes["intensity"], [4, 2, np.nan, 3, 1, np.nan])
+
+
+@pytest.mark.parametrize(
+    ("rows", "cols"),
+    [
+        ([0, 0, 1, 1, 1], [0, 1, 0, 1, 1]),  # a cell twice
+        ([0, 40, 1], [0, 40, 1]),  # nearly empty
+        ([0, 0, 0], [0, 1, 2]),  # a line
+        ([0, 30_000, 1], [0, 30_000, 1]),
+    ],
+)
+def test_indices_that_form_no_grid_leave_a_list(tmp_path, rows, cols):
+    indexed(tmp_path / "a.e57", rows, cols)
+    cloud = read(tmp_path / "a.e57")
+    assert cloud.shape is None
+    assert cloud.attributes["rowIndex"].tolist() == rows
+
+
+def test_the_case_of_one_missing_cell(shared_data):
+    cloud = read(shared_data.parent / "cases" / "grid_with_gap.e57")
+    assert cloud.shape == (6, 8)
+    assert np.flatnonzero(np.isnan(cloud.xyz).any(axis=1)).tolist() == [19]

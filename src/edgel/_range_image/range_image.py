@@ -132,7 +132,7 @@ def orthographic(xyz: np.ndarray, direction: np.ndarray) -> RangeImage:
     >>> image.shape, int((image.index >= 0).sum())
     ((28, 38), 600)
     """
-    right, down, forward = _axes(direction, np.array([0.0, 0.0, 1.0]))
+    right, down, forward = viewer_axes(direction, np.array([0.0, 0.0, 1.0]))
     middle = xyz.mean(axis=0)  # far from the origin the image's coordinates would lose their digits
     picture = (xyz - middle) @ np.column_stack([right, down])
     return _rastered(xyz, picture, xyz @ forward, "orthographic", None, forward)
@@ -147,7 +147,7 @@ def pinhole(xyz: np.ndarray, viewpoint: np.ndarray) -> RangeImage:
         If a point lies beside or behind such a camera.
     """
     rays = xyz - viewpoint
-    right, down, forward = _axes(rays.mean(axis=0), np.array([0.0, 0.0, 1.0]))
+    right, down, forward = viewer_axes(rays.mean(axis=0), np.array([0.0, 0.0, 1.0]))
     ahead = rays @ forward
     if not (ahead > _GRAZING * np.linalg.norm(rays, axis=1)).all():
         raise ValueError("viewpoint: some points lie beside or behind a camera there; use a spherical projection")
@@ -168,13 +168,13 @@ def spherical(xyz: np.ndarray, viewpoint: np.ndarray, up: np.ndarray | None = No
     rays = xyz - viewpoint
     up = np.array([0.0, 0.0, 1.0]) if up is None else up
     level = rays.mean(axis=0)
-    right, down, forward = _axes(level - (level @ up) * up, up)
+    right, down, forward = viewer_axes(level - (level @ up) * up, up)
     ahead, aside = rays @ forward, rays @ right
     picture = np.column_stack([np.arctan2(aside, ahead), np.arctan2(rays @ down, np.hypot(ahead, aside))])
     return _rastered(xyz, picture, np.linalg.norm(rays, axis=1), "spherical", viewpoint, forward)
 
 
-def _axes(direction: np.ndarray, up: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def viewer_axes(direction: np.ndarray, up: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Right, down and forward of a viewer."""
     length = np.linalg.norm(direction)
     forward = direction / length if length > 1e-12 else np.roll(up, 1)

@@ -59,7 +59,19 @@ class SeenEdges:
         unit = self.rays.spacing(near[seen])
         return float(np.median(self.facets.noise[seen] / unit)) if seen.any() else 0.0
 
-    def faces(self, edge: np.ndarray, xyz: np.ndarray, viewpoint: np.ndarray | None) -> Faces:
+    @property
+    def turn(self) -> np.ndarray:
+        """Angle (K,) by which the surface turns at each crease, radians."""
+        first, second = (self.rays.planes(planes[self.fold])[0] for planes in (self.folds.first, self.folds.second))
+        return np.arccos(np.clip((first * second).sum(axis=1), -1, 1))
+
+    def is_fine(self, kinds: EdgeKind) -> bool:
+        """Whether creases are asked for and the view is so clean, or its noise so simple, that neighbourhoods tell more."""
+        return self.facets.white and EdgeKind.CREASE in kinds
+
+    def faces(
+        self, edge: np.ndarray, xyz: np.ndarray, viewpoint: np.ndarray | None, known: Faces | None = None
+    ) -> Faces:
         """Say where the edge runs at edge points (E,), ascending, and how the surface lies on either side.
 
         Parameters
@@ -69,13 +81,15 @@ class SeenEdges:
             All points.
         viewpoint : (3,) float64 or None
             Normals are turned towards it, or upwards (+Z) without one.
+        known : Faces, optional
+            Of the same points, by their neighbourhoods: kept where they tell both sides.
         """
-        found = Faces.of_points(xyz[edge], self._own_normals(edge, viewpoint, xyz))
-        at = np.searchsorted(edge, self.creases)
-        at[at == len(edge)] = 0
-        which = np.flatnonzero(edge[at] == self.creases) if len(edge) else np.zeros(0, np.int64)
-        found.put(at[which], self._crease_faces(which, xyz, viewpoint), np.arange(len(which)))
-        return found
+        faces = known or Faces.of_points(xyz[edge], self._own_normals(edge, viewpoint, xyz))
+        if len(edge):
+            at = np.minimum(np.searchsorted(edge, self.creases), len(edge) - 1)
+            which = np.flatnonzero((edge[at] == self.creases) & (faces.convex[at] == 0))
+            faces.put(at[which], self._crease_faces(which, xyz, viewpoint), np.arange(len(which)))
+        return faces
 
     def _crease_faces(self, which: np.ndarray, xyz: np.ndarray, viewpoint: np.ndarray | None) -> Faces:
         fold = self.fold[which]

@@ -7,21 +7,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from edgel._neighbors.kdtree import NeighborIndex
+from edgel._neighbors.kdtree import NeighborIndex, build_index
+from edgel._range_image.near_far import SHOWN, explaining_direction
 from edgel._range_image.range_image import RangeImage, organized, orthographic, pinhole, spherical
+from edgel._range_image.regrid import camera_grid, map_grid, scanner_grid
+from edgel._range_image.rings import find_rings
 from edgel.cloud import Cloud, Points
 
 METHODS = ("auto", "surface", "organized", "orthographic", "pinhole", "spherical")
 
-SHOWN = 0.97  # least share of the points that one view has to show
 DEPTH = 3.0  # spacings behind the nearest point of its pixel within which a point still shows
-_SAMPLE = 50_000  # points at which directions are compared
+_SAMPLE = 50_000  # points at which directions are compared, where the best is asked for
+_FEW = 4_000  # and where only near and far sides are to be told apart
 _CAMERA = 0.5  # least cosine to the mean ray in the view of a camera
-_RINGS = (8, 256)  # how many lasers a spinning sensor has
-_RING_SHOTS = 100  # least mean number of shots of each
-_ON_RINGS = 0.95  # least share of the shots that lie on them
-_GAP = 5e-4  # of the range of elevations: least gap between rings
-_SHARP = 0.3  # of the gap between two rings: most that a ring is thick
+_DIGITS = 3  # of a cell: grids that fit as well as that are equally good, and the simplest is taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +45,9 @@ class View:
 def best_view(cloud: Cloud, xyz: np.ndarray, viewpoint: np.ndarray | None = None) -> View:
     """Choose how to look at a cloud: as its sensor saw it, where that is known, else at the surface itself.
 
-    A projection of a list of points loses to the surface even where one shows all of them: its pixels are no finer than
-    the spacing (docs/decisions.md).
+    A list of points that came from a grid, or from a spinning sensor, is put back on its grid. Of any other list a
+    projection loses to the surface even where one shows all of it: its pixels are no finer than the spacing
+    (docs/decisions.md).
 
     Parameters
     ----------
@@ -62,59 +62,61 @@ def best_view(cloud: Cloud, xyz: np.ndarray, viewpoint: np.ndarray | None = None
     >>> import numpy as np
     >>> x, y = np.meshgrid(np.arange(30.0), np.arange(20.0))
     >>> hill = np.c_[x.ravel(), y.ravel(), np.sin(x.ravel() / 5)]
-    >>> best_view(Cloud(hill), hill).method, best_view(Cloud(hill, shape=(20, 30)), hill).method
-    ('surface', 'organized')
+    >>> best_view(Cloud(hill), hill).reason
+    'the points lie on the grid of a height map, 20 x 30'
+    >>> shaken = hill + np.random.default_rng(0).normal(0, 0.3, hill.shape)
+    >>> best_view(Cloud(shaken), shaken).method
+    'surface'
     """
     if cloud.shape is not None and min(cloud.shape) > 1:
         return View("organized", f"the points form a grid of {cloud.shape[0]} x {cloud.shape[1]}")
     viewpoint = cloud.viewpoint if viewpoint is None else viewpoint
-    if viewpoint is not None:
-        rays = xyz - viewpoint
-        away = np.linalg.norm(rays, axis=1)
-        middle = rays.mean(axis=0)
-        camera = (rays @ middle >= _CAMERA * away * np.linalg.norm(middle)).all() and middle.any()
-        # A spinning sensor may see a narrow sector too: its lines lie farther apart than its shots.
-        image = _from_viewpoint(spherical, xyz, viewpoint)
-        if camera and image.pitch[0] == image.pitch[1] and away.min() > 0:
-            image = pinhole(xyz, viewpoint)
-        share = shown(image)
-        if share >= SHOWN:
-            return View(image.method, f"{share:.0%} of the points show from the viewpoint", image)
-        return View("surface", f"only {share:.0%} of the points show from the viewpoint")
-    if (rings := count_rings(xyz)) > 0:
-        reason = f"the points lie on {rings} rings about the origin, as those of a spinning sensor there"
-        return View("spherical", reason, _from_viewpoint(spherical, xyz, np.zeros(3)))
-    return View("surface", "the points form no grid and the sensor's place is not known")
+    if (view := _sensor_view(xyz, viewpoint)) is not None:
+        return view
+    if viewpoint is None:
+        return View("surface", "the points form no grid and the sensor's place is not known")
+    rays = xyz - viewpoint
+    away = np.linalg.norm(rays, axis=1)
+    middle = rays.mean(axis=0)
+    camera = (rays @ middle >= _CAMERA * away * np.linalg.norm(middle)).all() and middle.any()
+    # A spinning sensor may see a narrow sector too: its lines lie farther apart than its shots.
+    image = _from_viewpoint(spherical, xyz, viewpoint)
+    if camera and image.pitch[0] == image.pitch[1] and away.min() > 0:
+        image = pinhole(xyz, viewpoint)
+    share = shown(image)
+    if share >= SHOWN:
+        return View(image.method, f"{share:.0%} of the points show from the viewpoint", image)
+    return View("surface", f"only {share:.0%} of the points show from the viewpoint")
 
 
-def count_rings(xyz: np.ndarray) -> int:
-    """Count the lasers of a spinning sensor at the origin, its axis +Z; 0 where the elevations of points show none.
+def _sensor_view(xyz: np.ndarray, viewpoint: np.ndarray | None) -> View | None:
+    """See a list of points as the sensor did whose grid or rings it still shows; None where it shows none.
 
-    Parameters
-    ----------
-    xyz : (N, 3) float64
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> azimuth, elevation = np.meshgrid(np.arange(0, 6.28, 0.01), np.radians(np.arange(-15, 16, 2)))
-    >>> rays = np.stack([np.cos(azimuth), np.sin(azimuth), np.tan(elevation)], axis=-1).reshape(-1, 3)
-    >>> count_rings(rays * (5 + np.sin(rays[:, :1] * 9)))
-    16
+    A sensor whose place is not known is looked for at the origin, where sensors have theirs.
     """
-    level = np.hypot(xyz[:, 0], xyz[:, 1])
-    away = level + np.abs(xyz[:, 2]) > 0
-    elevation = np.sort(np.arctan2(xyz[away, 2], level[away]))
-    if len(elevation) < _RINGS[0] * _RING_SHOTS:
-        return 0
-    parted = np.flatnonzero(np.diff(elevation) > _GAP * (elevation[-1] - elevation[0]))
-    first, last = np.append(0, parted + 1), np.append(parted, len(elevation) - 1)
-    full = last - first + 1 >= _RING_SHOTS
-    first, last = first[full], last[full]
-    if not _RINGS[0] <= len(first) <= _RINGS[1] or (last - first + 1).sum() < _ON_RINGS * len(elevation):
-        return 0
-    thick, apart = elevation[last] - elevation[first], elevation[first[1:]] - elevation[last[:-1]]
-    return len(first) if np.median(thick) < _SHARP * np.median(apart) else 0
+    where = "origin" if viewpoint is None else "viewpoint"
+    eye = np.zeros(3) if viewpoint is None else viewpoint
+    below = viewpoint is not None and viewpoint[2] < np.median(xyz[:, 2])
+    if (rings := find_rings(xyz, eye)) is not None:
+        grid = rings.grid(xyz, eye)
+        image = _from_viewpoint(spherical, xyz, eye) if grid is None else grid.seen_from(xyz, "spherical", eye)
+        reason = f"the points lie on {rings.count} rings about the {where}, as those of a spinning sensor there"
+        return View("spherical", reason, image)
+    found = [
+        (grid, name, stands)
+        for grid, name, stands in (
+            (map_grid(xyz, from_below=below), "a height map", None),
+            (camera_grid(xyz, eye), f"a camera at the {where}", eye),
+            (scanner_grid(xyz, eye), f"a scanner at the {where}", eye),
+        )
+        if grid is not None
+    ]
+    if not found:
+        return None
+    grid, name, stands = min(found, key=lambda each: round(each[0].off, _DIGITS))
+    reason = f"the points lie on the grid of {name}, {grid.shape[0]} x {grid.shape[1]}"
+    image = grid.seen_along(xyz, below) if stands is None else grid.seen_from(xyz, "organized", stands)
+    return View("organized", reason, image)
 
 
 def _from_viewpoint(project: Callable[..., RangeImage], xyz: np.ndarray, viewpoint: np.ndarray) -> RangeImage:
@@ -128,7 +130,7 @@ def _from_viewpoint(project: Callable[..., RangeImage], xyz: np.ndarray, viewpoi
     return replace(image, index=np.where(image.index >= 0, rows[image.index], -1), behind=behind)
 
 
-def choose_view(cloud: Cloud, finite: Points, index: NeighborIndex, method: str, viewpoint: np.ndarray | None) -> View:
+def choose_view(cloud: Cloud, finite: Points, method: str, viewpoint: np.ndarray | None) -> View:
     """View a cloud in the way that is asked for, or ("auto") the best one.
 
     Parameters
@@ -136,8 +138,6 @@ def choose_view(cloud: Cloud, finite: Points, index: NeighborIndex, method: str,
     cloud : Cloud
     finite : Points
         Its finite points.
-    index : NeighborIndex
-        Of them.
     method : str
         One of `METHODS`.
     viewpoint : (3,) float64 or None
@@ -152,6 +152,7 @@ def choose_view(cloud: Cloud, finite: Points, index: NeighborIndex, method: str,
     if view.image is not None or view.method == "surface":
         return view
     if view.method == "orthographic":
+        index = build_index(xyz)  # a sample that does not depend on the order of the points
         sample = index.at(index.evenly_sampled(_SAMPLE))
         image = orthographic(xyz, _best_direction(xyz, sample, viewpoint))
     elif view.method == "organized":
@@ -163,6 +164,12 @@ def choose_view(cloud: Cloud, finite: Points, index: NeighborIndex, method: str,
             raise ValueError(f"method: {method!r} needs to know where the sensor was; give viewpoint, or use 'auto'")
         image = _from_viewpoint(pinhole if view.method == "pinhole" else spherical, xyz, viewpoint)
     return View(view.method, view.reason, image)
+
+
+def explaining_view(index: NeighborIndex) -> np.ndarray | None:
+    """Direction, (3,), that shows nearly all of a list of points whose sensor's place is not known; None: no one does."""
+    sample = index.at(index.evenly_sampled(_FEW))
+    return explaining_direction(sample, _directions(sample))
 
 
 def _best_direction(xyz: np.ndarray, sample: np.ndarray, viewpoint: np.ndarray | None) -> np.ndarray:

@@ -5,16 +5,8 @@ that makes an edge likely, the neighbours are asked too.
 """
 
 from edgel._surface.classify import Classification, classify
-from edgel._surface.faces import Faces, localize
-from edgel._surface.screen import Screening, screen
+from edgel._surface.screen import screen
 from edgel._surface.statistics import cloud_statistics
+from edgel._surface.surface import Surface
 
-__all__ = [
-    "Classification",
-    "Faces",
-    "Screening",
-    "classify",
-    "cloud_statistics",
-    "localize",
-    "screen",
-]
+__all__ = ["Classification", "Surface", "classify", "cloud_statistics", "screen"]

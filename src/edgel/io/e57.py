@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from edgel.cloud import Cloud
+from edgel.io.cells import in_cells
 from edgel.io.e57_check import check_xml
 from edgel.io.e57_write import CARTESIAN, GRID, NAMES, PREFIX, SPHERICAL, library
 from edgel.io.errors import FormatError
@@ -19,6 +20,7 @@ from edgel.io.limits import check_unpacked
 
 # The smallest of these that holds a field's bounds is its type.
 _INTEGERS = [np.dtype(code) for code in ("u1", "i1", "u2", "i2", "u4", "i4", "i8")]
+_EMPTIEST = 20  # cells for each point: indices that leave more of a grid empty are some other numbers
 
 
 @dataclass(frozen=True)
@@ -42,9 +44,10 @@ def read(path: str | os.PathLike[str]) -> Cloud:
         Cartesian or spherical coordinates as x, y, z in the file's frame (metres). Numeric fields become attributes by
         their names (``colorRed`` as ``red`` and so on; those of an extension keep its prefix); a field that only some
         scans have is NaN or 0 in the others. ``scan_index`` tells the scan when there are several. Of one scan the
-        scanner's position is the viewpoint, if it has a pose or spherical coordinates, and a complete grid of rowIndex
-        and columnIndex makes the cloud organized. Points the scanner marked invalid are NaN in an organized cloud and
-        left out otherwise; their number is ``metadata["e57_num_invalid"]``.
+        scanner's position is the viewpoint, if it has a pose or spherical coordinates, and rowIndex and columnIndex
+        make the cloud organized, unless they name a cell twice or leave more than 20 empty for each point: cells that
+        are not in the file are NaN (attributes that have no NaN: 0). Points the scanner marked invalid are NaN in an
+        organized cloud and left out otherwise; their number is ``metadata["e57_num_invalid"]``.
 
     Raises
     ------
@@ -207,11 +210,11 @@ def _merge(scans: list[_Scan]) -> Cloud:
         return Cloud(np.empty((0, 3)))
     num_invalid = sum(int(scan.invalid.sum()) for scan in scans)
     metadata = {"e57_num_invalid": num_invalid, "e57_num_scans": len(scans)}
-    if len(scans) == 1 and (order := _grid_order(scans[0])) is not None:
-        scan, (rows, shape) = scans[0], order
-        xyz = np.where(scan.invalid[:, None], np.nan, scan.xyz)[rows]
-        attributes = {name: values[rows] for name, values in scan.attributes.items() if name not in GRID}
-        return Cloud(xyz, attributes, shape, scan.position, None, metadata)
+    if len(scans) == 1 and (cells := _cells(scans[0])) is not None:
+        scan, (index, shape) = scans[0], cells
+        xyz = np.where(scan.invalid[:, None], np.nan, scan.xyz)
+        attributes = {name: values for name, values in scan.attributes.items() if name not in GRID}
+        return in_cells(Cloud(xyz, attributes, None, scan.position, None, metadata), index, shape)
     names = dict.fromkeys(name for scan in scans for name in scan.attributes)
     attributes = {name: np.concatenate([_column(scan, name, scans) for scan in scans]) for name in names}
     if len(scans) > 1:
@@ -228,15 +231,15 @@ def _column(scan: _Scan, name: str, scans: list[_Scan]) -> np.ndarray:
     return np.full(int((~scan.invalid).sum()), np.nan if dtype.kind == "f" else 0, dtype)
 
 
-def _grid_order(scan: _Scan) -> tuple[np.ndarray, tuple[int, int]] | None:
-    """Return the row-major order and the shape of a scan whose indices fill a grid, else None."""
+def _cells(scan: _Scan) -> tuple[np.ndarray, tuple[int, int]] | None:
+    """Return the point of each cell (-1: none), row by row, and the shape of a scan whose indices form a grid."""
     if any(name not in scan.attributes or not len(scan.xyz) for name in GRID):
         return None
     row, col = (scan.attributes[name].astype(np.int64) for name in GRID)
-    row, col = row - row.min(), col - col.min()
-    shape = int(row.max()) + 1, int(col.max()) + 1
-    if min(shape) < 2 or shape[0] * shape[1] != len(row):
+    low = int(row.min()), int(col.min())
+    shape = int(row.max()) - low[0] + 1, int(col.max()) - low[1] + 1
+    if min(shape) < 2 or shape[0] * shape[1] > _EMPTIEST * len(row):
         return None
-    cell = row * shape[1] + col
-    order = np.argsort(cell, kind="stable")
-    return (order, shape) if np.array_equal(cell[order], np.arange(len(cell))) else None
+    index = np.full(shape[0] * shape[1], -1)
+    index[(row - low[0]) * shape[1] + (col - low[1])] = np.arange(len(row))
+    return (index, shape) if np.count_nonzero(index >= 0) == len(row) else None

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import islice
 from typing import BinaryIO
 
 import numpy as np
 
 from edgel.cloud import Cloud
+from edgel.io.cells import in_cells
 from edgel.io.errors import FormatError
 from edgel.io.limits import check_unpacked, whole_number
 from edgel.io.ply_header import Header
@@ -67,16 +67,9 @@ def _cell(line: bytes) -> int:
 
 
 def spread(path: str, cloud: Cloud, index: np.ndarray, shape: tuple[int, int]) -> Cloud:
-    """Put the points of a range grid into their cells; the others become NaN (attributes that have no NaN: 0)."""
+    """Put the points of a range grid into their cells."""
     if len(index) and index.max() >= len(cloud):
         raise FormatError(
             f"{path}: range_grid names vertex {index.max()} of {len(cloud)}; the file is damaged: get it again"
         )
-    filled = index >= 0
-    xyz = np.full((len(index), 3), np.nan)
-    xyz[filled] = cloud.xyz[index[filled]]
-    attributes = {}
-    for name, values in cloud.attributes.items():
-        attributes[name] = np.full(len(index), np.nan if values.dtype.kind == "f" else 0, values.dtype)
-        attributes[name][filled] = values[index[filled]]
-    return replace(cloud, xyz=xyz, attributes=attributes, shape=shape)
+    return in_cells(cloud, index, shape)
