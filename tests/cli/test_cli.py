@@ -243,7 +243,7 @@ def test_the_summary_tells_what_is_known_of_the_creases():
     assert rows["crease"][2].startswith("median angle 90.0 degrees, ")
     assert "convex" in rows["crease"][2]
     assert "concave" in rows["crease"][2]
-    assert rows["method"] == ("method", "surface", edges.reason)
+    assert rows["method"] == ("method", edges.method, edges.reason)
 
 
 def test_detect_report(scan, tmp_path):

@@ -67,7 +67,7 @@ def find_lattice(values: np.ndarray) -> Lattice | None:
         off = fitted - first - step * place
         mean = place.mean()
         spread = ((place - mean) ** 2).sum()
-        change = ((place - mean) @ off) / spread if spread > 0 else 0.0
+        change = ((place - mean) * off).sum() / spread if spread > 0 else 0.0
         first, step = first + off.mean() - change * mean, step + change
     found = Lattice(float(first), float(step))
     return found if step > 0 and (found.places(fitted)[1] <= NEAR).mean() >= _ON else None

@@ -181,10 +181,10 @@ def one_a_cell(
     cells = rows * shape[1] + cols
     order = np.argsort(cells)
     own = np.diff(cells[order], prepend=-1) > 0
+    if np.count_nonzero(own) < _OWN * len(xyz):
+        return None
     if not own.all():
         order = np.lexsort((*xyz[points].T, depth, cells))[own]
-    if len(order) < _OWN * len(xyz):
-        return None
     filled = np.zeros((shape[0] + 2, shape[1] + 2), bool)
     filled[rows + 1, cols + 1] = True
     beside = filled[:-2, 1:-1] * 1 + filled[2:, 1:-1] + filled[1:-1, :-2] + filled[1:-1, 2:]

@@ -18,7 +18,7 @@ METHODS = ("auto", "surface", "organized", "orthographic", "pinhole", "spherical
 
 DEPTH = 3.0  # spacings behind the nearest point of its pixel within which a point still shows
 _SAMPLE = 50_000  # points at which directions are compared, where the best is asked for
-_FEW = 4_000  # and where only near and far sides are to be told apart
+_FEW = 1_500  # and where only near and far sides are to be told apart
 _CAMERA = 0.5  # least cosine to the mean ray in the view of a camera
 _DIGITS = 3  # of a cell: grids that fit as well as that are equally good, and the simplest is taken
 
