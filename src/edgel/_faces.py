@@ -59,7 +59,7 @@ def inside_of(out: np.ndarray, xyz: np.ndarray, viewpoint: np.ndarray | None) ->
 def facing(
     xyz: np.ndarray, normals: tuple[np.ndarray, np.ndarray], viewpoint: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Turn the two normals of each edge, both on the outside of its wedge, to the viewer's side, the one seen better first.
+    """Turn both normals of each edge, which lie on the outside of its wedge, to the viewer; the one seen better first.
 
     Returns
     -------

@@ -129,7 +129,7 @@ def _chance(rays: Rays, facets: Facets, shifts: np.ndarray, lengths: np.ndarray)
 
 @part
 def _compare(i, j, down, right, length, ray, plane, noise):
-    """Difference of the slopes per pixel, that of the values in the middle, and the noise; none where it is infinite."""
+    """Difference of the slopes per pixel, and of the values in the middle, and the noise: infinite where none is known."""
     rows, cols = ray.shape[0], ray.shape[1]
     a, b, c, d = i + down, j + right, i - down, j - right
     if min(a, c) < 0 or max(a, c) >= rows or min(b, d) < 0 or max(b, d) >= cols:
@@ -163,7 +163,7 @@ def _sample(start, stop, places, ray, plane, noise, ratio, shifts, lengths, widt
 
 @kernel
 def _score(start, stop, ray, plane, noise, ratio, shifts, lengths, sure, widths, central, score, best, offset):
-    rows, cols = noise.shape
+    cols = noise.shape[1]
     cosine = np.cos(MIN_TURN)
     ways = shifts.shape[1]
     for i in range(start, stop):
@@ -171,12 +171,10 @@ def _score(start, stop, ray, plane, noise, ratio, shifts, lengths, sure, widths,
             if ray[i, j, 0] == 0 and ray[i, j, 1] == 0 and ray[i, j, 2] == 0:
                 continue
             for s in range(len(widths)):
-                nominal = np.sqrt(24.0) / (widths[s] * widths[s]) * sure[s] / 1.0
+                nominal = np.sqrt(24.0) / (widths[s] * widths[s]) * sure[s]
                 for k in range(ways):
                     down, right = shifts[s, k, 0], shifts[s, k, 1]
-                    turn, gap, left = _compare(
-                        i, j, down, right, lengths[s, k], ray, plane[s], noise[i, j] * ratio[s]
-                    )
+                    turn, gap, left = _compare(i, j, down, right, lengths[s, k], ray, plane[s], noise[i, j] * ratio[s])
                     value = abs(turn) / (left * nominal)
                     if not value > score[i, j] or abs(gap) > (BESIDE[0] + BESIDE[1] * widths[s] / 2) * abs(turn):
                         continue
@@ -208,8 +206,8 @@ def _thin(start, stop, score, best, offset, shifts, lengths, widths, ray, plane,
             s, k = best[i, j] // ways, best[i, j] % ways
             largest = True
             for apart in (-2, -1, 1, 2):
-                r = i + int(round(apart * DIRECTIONS[k, 0]))
-                c = j + int(round(apart * DIRECTIONS[k, 1]))
+                r = i + round(apart * DIRECTIONS[k, 0])
+                c = j + round(apart * DIRECTIONS[k, 1])
                 if r < 0 or r >= rows or c < 0 or c >= cols or score[r, c] == 0:
                     continue
                 other = _weight(score, best, offset, widths, ways, r, c)

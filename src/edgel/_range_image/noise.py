@@ -15,7 +15,7 @@ _EVERY = 4  # rows or columns between those whose second differences are taken
 
 
 def noise_level(left: np.ndarray) -> np.ndarray:
-    """Lower quartile of what the smallest windows leave, over tiles; of 3 x 3 tiles the median, since some are full of edges."""
+    """Lower quartile of what the smallest windows leave, over tiles; of 3 x 3 tiles the median."""
     tiles = tuple(-(-length // _TILE) for length in left.shape)
     level = np.empty(tiles)
     run_slices(_tile_levels, tiles[0], left, level, size=1)

@@ -1,4 +1,4 @@
-"""The edges that a view shows, by point: creases from folds, outlines from steps and rims, and the surface beside them."""
+"""The edges that a view shows, by point: creases from folds, outlines from steps and rims, and the faces beside."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class SeenEdges:
         return np.arccos(np.clip((first * second).sum(axis=1), -1, 1))
 
     def is_fine(self, kinds: EdgeKind) -> bool:
-        """Whether creases are asked for and the view is so clean, or its noise so simple, that neighbourhoods tell more."""
+        """Whether creases are asked for and neighbourhoods tell more of them: in clean views and independent noise."""
         return self.facets.white and EdgeKind.CREASE in kinds
 
     def faces(
@@ -100,7 +100,9 @@ class SeenEdges:
         # The foot of the point on the line: along both normals, until it lies on both planes.
         off_a, off_b = (a * points).sum(axis=1) - offset_a, (b * points).sum(axis=1) - offset_b
         rest = 1 - cosine**2
-        foot = points - (((off_a - cosine * off_b) / rest)[:, None] * a + ((off_b - cosine * off_a) / rest)[:, None] * b)
+        foot = points - (
+            ((off_a - cosine * off_b) / rest)[:, None] * a + ((off_b - cosine * off_a) / rest)[:, None] * b
+        )
         line = np.cross(a, b)
         # Both normals point to the viewer: to the outside of the wedge where it is convex.
         outside = np.where(self.folds.convex[fold], 1.0, -1.0)[:, None]

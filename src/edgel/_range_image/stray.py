@@ -32,7 +32,7 @@ def without_stray(rays: Rays) -> Rays:
 
 @kernel
 def _without_stray(start, stop, near, close, central, held, kept):
-    height, width = near.shape
+    width = near.shape[1]
     steps = np.empty((2, 25), np.float32)
     for row in range(start, stop):
         for col in range(width):

@@ -167,7 +167,7 @@ def choose_view(cloud: Cloud, finite: Points, method: str, viewpoint: np.ndarray
 
 
 def explaining_view(index: NeighborIndex) -> np.ndarray | None:
-    """Direction, (3,), that shows nearly all of a list of points whose sensor's place is not known; None: no one does."""
+    """Return the direction (3,) that shows nearly all of a list of points, None if none does."""
     sample = index.at(index.evenly_sampled(_FEW))
     return explaining_direction(sample, _directions(sample))
 

@@ -51,7 +51,7 @@ class Surface:
             return classify(index, screening)
 
     def faces(self, edge: np.ndarray, crease: np.ndarray, num_neighbors: int, viewpoint: np.ndarray | None) -> Faces:
-        """Say where the edge runs at points (E,), ascending, those that are creases flagged (E,), and how the surface lies.
+        """Say where the edge runs at points (E,), ascending, with flags (E,) of creases, and how the surface lies.
 
         Normals are turned towards the viewpoint, or upwards (+Z) without one.
         """
