@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+
+from edgel._kernels.parallel import kernel, run_slices
 
 LARGEST = 1e30
 """Largest coordinate, in magnitude: squares of distances stay far from overflow and offsets fit single precision. In
@@ -171,8 +174,10 @@ def check_points(points: Any, *, minimum: int = 3) -> Points:
     if clean:
         rows = np.arange(len(xyz))
     else:
-        rows = np.flatnonzero(np.isfinite(xyz).all(axis=1))
-        xyz = xyz if len(rows) == len(xyz) else xyz[rows]
+        finite = np.empty(len(xyz), np.bool_)
+        run_slices(_finite, len(xyz), xyz, finite, size=65536)
+        rows = np.flatnonzero(finite)
+        xyz = xyz if len(rows) == len(xyz) else xyz.take(rows, axis=0)
         _check_size(xyz, rows, "points")
     if len(rows) < minimum:
         found = (
@@ -180,6 +185,12 @@ def check_points(points: Any, *, minimum: int = 3) -> Points:
         )
         raise ValueError(f"points: needs at least {minimum} points with finite coordinates, got {found}")
     return Points(np.ascontiguousarray(xyz), rows, len(as_cloud(points)))
+
+
+@kernel
+def _finite(start, stop, xyz, finite):
+    for p in range(start, stop):
+        finite[p] = math.isfinite(xyz[p, 0]) and math.isfinite(xyz[p, 1]) and math.isfinite(xyz[p, 2])
 
 
 def check_rows(at: Any, num_points: int) -> np.ndarray:

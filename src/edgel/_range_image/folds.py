@@ -23,6 +23,7 @@ CHAIN = 4  # cells: chains that are shorter are specks
 MIN_TURN = np.radians(20.0)  # least angle between the planes
 GAPS = np.array([0.5, 0.5, 1.0])  # cells between the middle and each window, for each of `HALVES`
 MISFIT = 4.0  # noises that a window may leave
+EXPLAINED = 1.08  # of what windows leave in the median: where no window leaves more, one plane explains the place
 BESIDE = 2.0, 0.1  # pixels, and widths of the window, from the middle at which the planes may meet
 PARABOLA = 0.3, 0.7  # pixels, and shares of what a parabola does, by which a fold's middle may leave its planes
 DIRECTIONS = np.array([(0, 1), (1, 2), (1, 1), (2, 1), (1, 0), (2, -1), (1, -1), (1, -2)], float)
@@ -129,7 +130,7 @@ def _chance(rays: Rays, facets: Facets, shifts: np.ndarray, lengths: np.ndarray)
 
 @part
 def _compare(i, j, down, right, length, ray, plane, noise):
-    """Difference of the slopes per pixel, and of the values in the middle, and the noise: infinite where none is known."""
+    """Difference of slopes per pixel and of values in the middle, and the noise: infinite where none is known."""
     rows, cols = ray.shape[0], ray.shape[1]
     a, b, c, d = i + down, j + right, i - down, j - right
     if min(a, c) < 0 or max(a, c) >= rows or min(b, d) < 0 or max(b, d) >= cols:
@@ -169,6 +170,11 @@ def _score(start, stop, ray, plane, noise, ratio, shifts, lengths, sure, widths,
     for i in range(start, stop):
         for j in range(cols):
             if ray[i, j, 0] == 0 and ray[i, j, 1] == 0 and ray[i, j, 2] == 0:
+                continue
+            explained = True
+            for s in range(len(widths)):
+                explained = explained and plane[s, i, j, 3] < EXPLAINED * ratio[s] * noise[i, j]
+            if explained:
                 continue
             for s in range(len(widths)):
                 nominal = np.sqrt(24.0) / (widths[s] * widths[s]) * sure[s]

@@ -5,13 +5,22 @@ from __future__ import annotations
 import numpy as np
 
 
-def neighbours(index: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Pairs of points one below the other, and side by side."""
+def neighbours(index: np.ndarray, most: int | None = None) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Pairs of points one below the other, and side by side; some `most` of each, evenly spread, if that is given."""
+    stride = 1 if most is None else max(int(np.sqrt(index.size / most)), 1)
     pairs = []
     for a, b in ((index[:-1], index[1:]), (index[:, :-1], index[:, 1:])):
+        a, b = a[::stride, ::stride], b[::stride, ::stride]
         both = (a >= 0) & (b >= 0)
         pairs.append((a[both], b[both]))
     return pairs
+
+
+def angles(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Distances between the unit vectors along vectors (M, 3) and (M, 3), where neither is 0."""
+    lengths = np.linalg.norm(a, axis=1), np.linalg.norm(b, axis=1)
+    known = (lengths[0] > 0) & (lengths[1] > 0)
+    return np.linalg.norm(a[known] / lengths[0][known, None] - b[known] / lengths[1][known, None], axis=1)
 
 
 def parallel_direction(xyz: np.ndarray, pairs: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:

@@ -11,7 +11,7 @@ CLEAN = 0.1  # spacings: noise below which it does not matter whose it is
 WHITE = 0.9  # least of the noise that second differences of neighbours show: smoothed or rounded, they show less
 _TILE = 16  # cells, over which the noise is estimated
 _QUIET = 0.25  # of the windows there: most may lie on edges, and without edges all leave nearly the same
-_EVERY = 4  # rows or columns between those whose second differences are taken
+_EVERY = 16  # rows or columns between those whose second differences are taken
 
 
 def noise_level(left: np.ndarray) -> np.ndarray:

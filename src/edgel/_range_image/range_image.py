@@ -10,18 +10,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import kernel, run_slices
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import knn
 from edgel._neighbors.queries import at_places
 from edgel._neighbors.spacing import covered_area
-from edgel._range_image.grid_steps import neighbours, parallel_direction, pitch_of, unevenness
+from edgel._range_image.grid_steps import angles, neighbours, parallel_direction, pitch_of, unevenness
 
 FRAME = 4  # empty pixels around a projection, so that the cloud's rim lies beside a void
 _SAMPLE = 2000  # points at which the evenness of the image is looked at
 _RINGS = 0.25  # nearest neighbours this much flatter than 45 degrees lie on scan lines along the rows
 _GRID, _EVEN = 0.9, 0.75  # nearest neighbours of a grid are 1 spacing away, those of random points 0.5
 _LOOSE = 1.3  # pixels of random points are this much larger than their spacing, or a third would be empty
+_PAIRS = 5_000  # neighbours along a column, and along a row, at which an organized cloud is looked at
 _GRAZING = 1e-6  # cosine to the optical axis from which a point lies beside the camera
 _MOST_PIXELS = 50  # for each point
 
@@ -90,29 +91,40 @@ def organized(
     index[rows] = np.arange(len(xyz))
     index = index.reshape(shape)
     eye = np.zeros(3) if viewpoint is None else viewpoint
-    depth = np.linalg.norm(xyz - eye, axis=1)
-    pairs = neighbours(index)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        rays = (xyz - eye) / depth[:, None]
-    from_eye = [np.linalg.norm(rays[b] - rays[a], axis=1) for a, b in pairs]
-    from_eye = [step[np.isfinite(step)] for step in from_eye]  # points in the eye itself have no ray
+    pairs = neighbours(index, most=_PAIRS)
+    from_eye = [angles(xyz[a] - eye, xyz[b] - eye) for a, b in pairs]
     direction = parallel_direction(xyz, pairs)
-    across = xyz - (xyz @ direction)[:, None] * direction
-    parallel = [np.linalg.norm(across[b] - across[a], axis=1) for a, b in pairs]
-    middle = rays[depth > 0].mean(axis=0) if (depth > 0).any() else np.array([0.0, 0.0, 1.0])
-    if unevenness(parallel) < unevenness(from_eye):
+    across = [_across(xyz[b] - xyz[a], direction) for a, b in pairs]
+    middle = _unit((xyz[pairs[0][0]] - eye).mean(axis=0)) if len(pairs[0][0]) else _unit(xyz.mean(axis=0) - eye)
+    if unevenness(across) < unevenness(from_eye):
         facing = direction @ (middle if viewpoint is not None or direction[2] == 0 else -direction * direction[2])
         direction = -direction if facing < 0 else direction
-        depth, steps, eye, middle = xyz @ direction, parallel, None, direction
+        steps, eye, middle = across, None, direction
     else:
         steps = from_eye
-    if eye is not None:  # what lies in the viewpoint itself does not show: sensors report shots without an echo so
-        index.ravel()[rows[depth == 0]] = -1
-        depth = np.where(depth > 0, depth, np.nan)
+    depth = np.full(len(xyz), np.nan)
+    run_slices(_depths, len(xyz), xyz, np.zeros(3) if eye is None else eye, eye is not None, middle, depth)
+    # What lies in the viewpoint itself does not show: sensors report shots without an echo so.
+    index.ravel()[rows[np.isnan(depth)]] = -1
     image = np.full(shape, np.nan)
     image.ravel()[rows] = depth
     pitch = [pitch_of(step) for step in steps]
-    return RangeImage(image, index, "organized", (pitch[0], pitch[1]), eye, _unit(middle), np.zeros(len(xyz)))
+    return RangeImage(image, index, "organized", (pitch[0], pitch[1]), eye, middle, np.zeros(len(xyz)))
+
+
+@kernel
+def _depths(start, stop, xyz, eye, central, direction, depth):
+    for p in range(start, stop):
+        x, y, z = xyz[p, 0] - eye[0], xyz[p, 1] - eye[1], xyz[p, 2] - eye[2]
+        if not central:
+            depth[p] = x * direction[0] + y * direction[1] + z * direction[2]
+        elif x != 0 or y != 0 or z != 0:
+            depth[p] = np.sqrt(x * x + y * y + z * z)
+
+
+def _across(steps: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Lengths of steps (M, 3) across a direction."""
+    return np.linalg.norm(steps - (steps @ direction)[:, None] * direction, axis=1)
 
 
 def orthographic(xyz: np.ndarray, direction: np.ndarray) -> RangeImage:
@@ -264,4 +276,5 @@ def _nearest(pixels, depth, xyz, index):
 
 
 def _unit(vector: np.ndarray) -> np.ndarray:
-    return vector / np.linalg.norm(vector)
+    length = np.linalg.norm(vector)
+    return vector / length if length > 0 else np.array([0.0, 0.0, 1.0])

@@ -12,9 +12,11 @@ from edgel._range_image.rays import APART, Rays
 STEP = 2.0  # spacings: least break of the surface between two pixels
 GAP = 2.0  # spacings: least difference of their depths
 LEAST = 0.5  # spacings between neighbours: what is less is not looked at
+EXPLAINED = 1.5  # noises that a window leaves around which no step is looked for
 SMEAR = 2  # pixels to either side over which a sensor may smear a step
 SURE = 6.2  # standard deviations by which a break exceeds what noise explains
 WEAK = 2 / 3  # of all that, where a break continues a sure one
+FAINTEST = 0.2  # of all that: what is less is not kept at any strength
 CHAIN = 8  # pixels: chains of both sides that are shorter are specks
 SHEER = 4.0, 4  # times all that, and pixels: steps so high need no longer chain
 BRIDGE = 2  # pixels: a hole no wider is bridged; where it slants, it may be BRIDGED wide along rows or columns
@@ -50,9 +52,9 @@ def find_steps(rays: Rays, facets: Facets, void: np.ndarray) -> tuple[np.ndarray
             _steps, shape[way], way, rays.near, rays.ray, facets.plane[0], facets.noise, facets.cell,
             max(rays.side, rays.pitch[1 - way]), rays.central, sure, void, bridged[way], smear, step, side, size=_BAND,
         )  # fmt: skip
-    step = step.astype(np.float64)
+    step = np.where(step < FAINTEST, 0.0, step.astype(np.float64))
     level = levels(step, WEAK, CHAIN)
-    sheer = levels(step / SHEER[0], WEAK, SHEER[1])
+    sheer = levels(np.where(step < WEAK * SHEER[0] * FAINTEST, 0.0, step / SHEER[0]), WEAK, SHEER[1])
     return np.fmax(level, sheer), side
 
 
@@ -174,12 +176,15 @@ def _steps(start, stop, way, near, ray, plane, noise, cell, unit, central, sure,
                     r, c = r + dr, c + dc
             if r >= height or c >= width or near[r, c] != near[r, c]:
                 continue
+            i, j = row // cell[0], col // cell[1]
+            # The window around a pixel beside a step lies on both sides of it: where one plane explains it, none is.
+            if plane[i, j, 3] < EXPLAINED * noise[i, j]:
+                continue
             gap = near[r, c] - own
             spacing = unit * max(own, near[r, c]) if central else unit
             if not abs(gap) > LEAST * spacing or not _steepest(row, col, r, c, dr, dc, gap, near, smear):
                 continue
-            sigma = noise[row // cell[0], col // cell[1]]
-            value = 0.0
+            sigma, value = noise[i, j], 0.0
             for apart in range(min(smear, bridged) + 1):
                 p, q, u, v = row - apart * dr, col - apart * dc, r + apart * dr, c + apart * dc
                 if p < 0 or q < 0 or u >= height or v >= width:
