@@ -10,8 +10,7 @@ from edgel.edges import EdgeKind
 
 LIKELY = 0.5  # strength of an edge that is as likely as not
 EVEN = (0.45, 0.5)  # probability of an edge that is as likely as not: least, on the vaguest cloud, and most
-NOISY = 0.5  # spacings of noise from which windows in the image help neighbourhoods
-BOLD = np.radians(30.0)  # least turn of the creases that they add
+BOLD = np.radians(30.0)  # least turn of the creases that windows in the image add to those of neighbourhoods
 COLOR = 0.2  # contrast of a color edge that is as likely as not
 
 
@@ -52,7 +51,7 @@ def label_edges(
     if seen is not None:
         bold = np.ones(len(seen.creases), bool)
         if classified is not None:  # in much noise windows find what neighbourhoods miss, but bends as well
-            bold &= (seen.noise > NOISY) & (seen.turn > BOLD)
+            bold = seen.turn > BOLD
         labels.add(seen.creases[bold], EdgeKind.CREASE, seen.crease_strength[bold])
         labels.add(seen.points, seen.kind, seen.strength)
     elif classified is not None:

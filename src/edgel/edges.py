@@ -28,9 +28,11 @@ class EdgeKind(IntFlag):
     """A step in color or intensity."""
     IMAGE = 32
     """An edge of the projected image, of a kind not told apart (the published method)."""
+    FRAME = 64
+    """The end of what the sensor sees, no edge of things: the first and last rows and columns of an organized cloud."""
 
 
-ASKABLE = EdgeKind.BOUNDARY | EdgeKind.OCCLUDING | EdgeKind.OCCLUDED | EdgeKind.CREASE | EdgeKind.COLOR
+ASKABLE = EdgeKind(127) & ~EdgeKind.IMAGE
 """The kinds that a detector can be asked for; `EdgeKind.IMAGE` is the published method's alone."""
 
 FIRST_COLUMNS = ("edge_kind", "edge_strength", "edge_angle", "edge_convex", "nx", "ny", "nz")

@@ -29,12 +29,16 @@ def levels(values: np.ndarray, weak: float, least: int) -> np.ndarray:
     (H, W) float64
         0 where no threshold above `FAINTEST` keeps the pixel.
     """
-    padded = np.pad(values, 1).ravel()
-    shown = np.flatnonzero(padded >= weak * FAINTEST)
-    order = shown[np.argsort(-padded[shown], kind="stable")]
-    found = np.zeros(len(padded))
-    _join(order, padded, values.shape[1] + 2, weak, least, found)
-    return found.reshape(values.shape[0] + 2, -1)[1:-1, 1:-1]
+    flat = values.ravel()
+    shown = np.flatnonzero(flat >= weak * FAINTEST)
+    order = shown[np.argsort(-flat[shown], kind="stable")]
+    rank = np.full(len(flat), -1, np.int32)
+    rank[order] = np.arange(len(order))
+    level = np.zeros(len(order))
+    _join(order, rank, flat[order], values.shape[1], weak, least, level)
+    found = np.zeros(len(flat))
+    found[order] = level
+    return found.reshape(values.shape)
 
 
 @kernel
@@ -53,20 +57,23 @@ def _settle(root, until, weak, least, values, size, since, following, head, foun
 
 
 @kernel
-def _join(order, values, width, weak, least, found):
-    """Join pixels, the largest first; a chain's root is its largest pixel, `since` when it last grew."""
+def _join(order, rank, values, width, weak, least, found):
+    """Join pixels by their rank, the largest first; a chain's root is its largest pixel, `since` when it last grew."""
     count = len(values)
     parent = np.full(count, -1, np.int64)
     following, head, tail = np.full(count, -1, np.int64), np.full(count, -1, np.int64), np.full(count, -1, np.int64)
     size, since = np.zeros(count, np.int64), np.zeros(count)
-    for pixel in order:
+    for pixel in range(count):
         value = values[pixel]
         parent[pixel] = head[pixel] = tail[pixel] = pixel
         size[pixel], since[pixel] = 1, value
         for r in range(-1, 2):
             for c in range(-1, 2):
-                beside = pixel + r * width + c
-                if parent[beside] < 0:
+                place, col = order[pixel] + r * width + c, order[pixel] % width + c
+                if place < 0 or place >= len(rank) or col < 0 or col >= width:
+                    continue
+                beside = rank[place]
+                if beside < 0 or parent[beside] < 0:
                     continue
                 a, b = find_root(parent, beside), find_root(parent, pixel)
                 if a == b:
@@ -84,6 +91,6 @@ def _join(order, values, width, weak, least, found):
                     else:
                         head[a] = head[b]
                     tail[a] = tail[b]
-    for pixel in order:
+    for pixel in range(count):
         if parent[pixel] == pixel:
             _settle(pixel, 0.0, weak, least, values, size, since, following, head, found)

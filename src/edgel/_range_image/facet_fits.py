@@ -53,6 +53,11 @@ class Facets:
     stretch: float
     white: bool
 
+    def noise_in(self, rays: Rays) -> float:
+        """Median of the noise, in spacings."""
+        seen = self.ray[:, :, 3] != 0
+        return float(np.median(self.noise[seen] / rays.spacing(self.ray[seen, 3]))) if seen.any() else 0.0
+
 
 def fit_facets(rays: Rays) -> Facets:
     """Fit planes in windows of `HALVES` around every cell."""

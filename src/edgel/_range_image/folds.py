@@ -18,12 +18,14 @@ from edgel._range_image.facet_fits import HALVES, Facets
 from edgel._range_image.rays import Rays
 
 SURE = 6.0  # spreads of chance by which slopes differ where a fold is as likely as not
+FAINTEST = 0.1  # of that: what is less is not kept at any strength
 WEAK = 0.5  # of that, where a fold continues a sure one
 CHAIN = 4  # cells: chains that are shorter are specks
 MIN_TURN = np.radians(20.0)  # least angle between the planes
 GAPS = np.array([0.5, 0.5, 1.0])  # cells between the middle and each window, for each of `HALVES`
 MISFIT = 4.0  # noises that a window may leave
-EXPLAINED = 1.08  # of what windows leave in the median: where no window leaves more, one plane explains the place
+EXPLAINED = np.array([1.4, 1.2, 1.1])
+"""Of what windows leave in the median, for each of `HALVES`: where none leaves more, one plane explains the place."""
 BESIDE = 2.0, 0.1  # pixels, and widths of the window, from the middle at which the planes may meet
 PARABOLA = 0.3, 0.7  # pixels, and shares of what a parabola does, by which a fold's middle may leave its planes
 DIRECTIONS = np.array([(0, 1), (1, 2), (1, 1), (2, 1), (1, 0), (2, -1), (1, -1), (1, -2)], float)
@@ -60,6 +62,14 @@ class Folds:
     across: np.ndarray
     offset: np.ndarray
     convex: np.ndarray
+
+
+def no_folds() -> Folds:
+    """What is found where none are looked for."""
+    return Folds(
+        np.zeros(0), np.zeros((0, 2), np.int64), np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32),
+        np.zeros((0, 2)), np.zeros(0), np.zeros(0, bool),
+    )  # fmt: skip
 
 
 def find_folds(rays: Rays, facets: Facets) -> Folds:
@@ -173,30 +183,43 @@ def _score(start, stop, ray, plane, noise, ratio, shifts, lengths, sure, widths,
                 continue
             explained = True
             for s in range(len(widths)):
-                explained = explained and plane[s, i, j, 3] < EXPLAINED * ratio[s] * noise[i, j]
+                explained = explained and plane[s, i, j, 3] < EXPLAINED[s] * ratio[s] * noise[i, j]
             if explained:
                 continue
             for s in range(len(widths)):
                 nominal = np.sqrt(24.0) / (widths[s] * widths[s]) * sure[s]
-                for k in range(ways):
+                # Every other direction first, then those beside the best of them.
+                steepest, middle = 0.0, -1
+                for n in range(ways // 2 + 2):
+                    if n >= ways // 2 and middle < 0:
+                        break
+                    k = 2 * n if n < ways // 2 else (middle + (1 if n == ways // 2 else ways - 1)) % ways
                     down, right = shifts[s, k, 0], shifts[s, k, 1]
                     turn, gap, left = _compare(i, j, down, right, lengths[s, k], ray, plane[s], noise[i, j] * ratio[s])
                     value = abs(turn) / (left * nominal)
-                    if not value > score[i, j] or abs(gap) > (BESIDE[0] + BESIDE[1] * widths[s] / 2) * abs(turn):
+                    if n < ways // 2 and value > steepest:
+                        steepest, middle = value, k
+                    if value < FAINTEST or not value > score[i, j]:
                         continue
-                    if value < 0.05:
+                    if abs(gap) > (BESIDE[0] + BESIDE[1] * widths[s] / 2) * abs(turn):
                         continue
-                    dot = first = second = 0.0
-                    for m in range(3):
-                        a, b = plane[s, i + down, j + right, m], plane[s, i - down, j - right, m]
-                        if m == 2 and not central:
-                            a = b = np.float32(1.0)
-                        dot += a * b
-                        first += a * a
-                        second += b * b
-                    if dot > cosine * np.sqrt(first * second):
+                    if _cosine(plane[s, i + down, j + right], plane[s, i - down, j - right], central) > cosine:
                         continue
                     score[i, j], best[i, j], offset[i, j] = value, s * ways + k, -gap / turn
+
+
+@part
+def _cosine(first, second, central):
+    """Cosine of the angle between the normals of two planes."""
+    dot = a2 = b2 = 0.0
+    for m in range(3):
+        a, b = first[m], second[m]
+        if m == 2 and not central:
+            a = b = np.float32(1.0)
+        dot += a * b
+        a2 += a * a
+        b2 += b * b
+    return dot / np.sqrt(a2 * b2)
 
 
 @kernel

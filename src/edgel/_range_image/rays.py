@@ -76,13 +76,14 @@ def trace_rays(image: RangeImage, xyz: np.ndarray) -> Rays:
     """
     ray, near = np.empty((*image.shape, 3), np.float32), np.empty(image.shape, np.float32)
     central = image.viewpoint is not None
-    axes, origin = np.eye(3), image.viewpoint
-    if not central:
+    axes, origin = np.eye(3), xyz[len(xyz) // 2]
+    if image.viewpoint is not None:
+        origin = image.viewpoint
+    else:
         forward = image.direction
         right = np.cross(forward, np.eye(3)[np.argmin(np.abs(forward))])
         right /= np.linalg.norm(right)
         axes = np.stack([right, np.cross(forward, right), forward])
-        origin = xyz[len(xyz) // 2]
     run_slices(_trace, len(near), image.index, xyz, axes, origin, central, ray, near, size=_BAND)
     return Rays(ray, near, axes, origin, central, image.pitch)
 

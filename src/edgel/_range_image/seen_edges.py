@@ -9,13 +9,14 @@ import numpy as np
 from edgel._faces import Faces, facing, inside_of
 from edgel._kernels.parallel import kernel, run_slices
 from edgel._range_image.facet_fits import Facets, fit_facets
-from edgel._range_image.folds import Folds, find_folds
+from edgel._range_image.folds import Folds, find_folds, no_folds
 from edgel._range_image.range_image import RangeImage
 from edgel._range_image.rays import Rays, trace_rays
 from edgel._range_image.steps import find_rims, find_steps, find_voids, own_plane
 from edgel._range_image.stray import without_stray
 from edgel.edges import EdgeKind
 
+NOISY = 0.5  # spacings of independent noise from which windows in the image help neighbourhoods
 OUTLINE = EdgeKind.BOUNDARY | EdgeKind.OCCLUDING | EdgeKind.OCCLUDED
 
 
@@ -50,14 +51,6 @@ class SeenEdges:
     rays: Rays
     facets: Facets
     image: RangeImage
-
-    @property
-    def noise(self) -> float:
-        """Median of the noise, in spacings."""
-        near = self.facets.ray[:, :, 3]
-        seen = self.facets.ray.any(axis=2)
-        unit = self.rays.spacing(near[seen])
-        return float(np.median(self.facets.noise[seen] / unit)) if seen.any() else 0.0
 
     @property
     def turn(self) -> np.ndarray:
@@ -131,17 +124,26 @@ def see_edges(image: RangeImage, xyz: np.ndarray, kinds: EdgeKind) -> SeenEdges:
     """Find the edges of some kinds that a range image of points (N, 3) shows."""
     rays = without_stray(trace_rays(image, xyz))
     facets = fit_facets(rays)
-    folds = find_folds(rays, facets)
+    wants_folds = EdgeKind.CREASE in kinds and (not facets.white or facets.noise_in(rays) > NOISY)
+    folds = find_folds(rays, facets) if wants_folds else no_folds()
     pixels, level, fold = _pixels_of(folds, facets, rays.near)
     creases = image.index.ravel()[pixels]
     ascending = np.argsort(creases)
     level = level[ascending]
-    void = find_voids(rays)
-    rim = find_rims(rays.near, void)
-    step, side = find_steps(rays, facets, void)
+    if kinds & OUTLINE:
+        void = find_voids(rays)
+        rim = find_rims(rays.near, void)
+        step, side = find_steps(rays, facets, void)
+    else:
+        rim, step, side = np.zeros(image.shape, bool), np.zeros(image.shape), np.zeros(image.shape, np.uint8)
     kind = np.where(step > 0, side, 0) | np.where(rim, int(EdgeKind.BOUNDARY), 0)
+    frame = np.zeros(image.shape, bool)
+    if EdgeKind.FRAME in kinds and image.method == "organized":
+        frame[[0, -1]], frame[:, [0, -1]] = True, True
+        frame &= image.index >= 0
+        kind |= np.where(frame, int(EdgeKind.FRAME), 0)
     outline = np.flatnonzero(kind)
-    strength = np.where(rim.ravel()[outline], 1.0, step.ravel()[outline] / (1 + step.ravel()[outline]))
+    strength = np.where((rim | frame).ravel()[outline], 1.0, step.ravel()[outline] / (1 + step.ravel()[outline]))
     return SeenEdges(
         image.index.ravel()[outline],
         kind.ravel()[outline].astype(np.uint8),

@@ -50,7 +50,8 @@ def find_steps(rays: Rays, facets: Facets, void: np.ndarray) -> tuple[np.ndarray
     for way in (0, 1):  # a pixel belongs to pairs of two rows: bands of the second way are columns
         run_slices(
             _steps, shape[way], way, rays.near, rays.ray, facets.plane[0], facets.noise, facets.cell,
-            max(rays.side, rays.pitch[1 - way]), rays.central, sure, void, bridged[way], smear, step, side, size=_BAND,
+            max(rays.side, rays.pitch[1 - way]), rays.central, sure, void, bridged[way], smear, step, side,
+            size=(1 + 3 * way) * _BAND,
         )  # fmt: skip
     step = np.where(step < FAINTEST, 0.0, step.astype(np.float64))
     level = levels(step, WEAK, CHAIN)
@@ -170,15 +171,15 @@ def _steps(start, stop, way, near, ray, plane, noise, cell, unit, central, sure,
             own = near[row, col]
             if own != own:
                 continue
+            i, j = row // cell[0], col // cell[1]
+            # The window around a pixel beside a step lies on both sides of it: where one plane explains it, none is.
+            if plane[i, j, 3] < EXPLAINED * noise[i, j]:
+                continue
             r, c = row + dr, col + dc
             for _ in range(bridged):
                 if r < height and c < width and near[r, c] != near[r, c] and not void[r, c]:
                     r, c = r + dr, c + dc
             if r >= height or c >= width or near[r, c] != near[r, c]:
-                continue
-            i, j = row // cell[0], col // cell[1]
-            # The window around a pixel beside a step lies on both sides of it: where one plane explains it, none is.
-            if plane[i, j, 3] < EXPLAINED * noise[i, j]:
                 continue
             gap = near[r, c] - own
             spacing = unit * max(own, near[r, c]) if central else unit

@@ -18,6 +18,7 @@ KIND_MEANINGS: dict[EdgeKind, str] = {
     EdgeKind.CREASE: "two faces meet",
     EdgeKind.COLOR: "a step in color or intensity",
     EdgeKind.IMAGE: "edge of the projected image",
+    EdgeKind.FRAME: "the end of what the sensor sees",
 }
 
 _LIGHT = np.array([-0.35, -0.45, 0.82])  # towards the light, in the scene: from the left, the front and above
