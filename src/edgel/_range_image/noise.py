@@ -9,9 +9,10 @@ from edgel._range_image.rays import APART, Rays
 
 CLEAN = 0.1  # spacings: noise below which it does not matter whose it is
 WHITE = 0.9  # least of the noise that second differences of neighbours show: smoothed or rounded, they show less
+ALIKE = 0.7  # or least of those of pixels two apart: where there is much structure, that hides in them less
 _TILE = 16  # cells, over which the noise is estimated
 _QUIET = 0.25  # of the windows there: most may lie on edges, and without edges all leave nearly the same
-_EVERY = 16  # rows or columns between those whose second differences are taken
+_LINES = 40  # rows or columns, at least, whose second differences are taken
 
 
 def noise_level(left: np.ndarray) -> np.ndarray:
@@ -34,20 +35,23 @@ def is_white(rays: Rays, near: np.ndarray, noise: np.ndarray, cell: tuple[int, i
     (I, J) around cells of mean `near` (I, J), are smaller than the sqrt(6) of independent noise, along some direction.
     """
     seen = near != 0
-    if not seen.any():
+    if not rays.gridded or not seen.any():
         return True
     if np.median(noise[seen] / rays.spacing(near[seen])) < CLEAN:
         return True
     stretch = rays.pitch[0] / rays.pitch[1]
     for axis in (0, 1) if 1 / APART < stretch < APART else (int(stretch > 1),):  # neighbours on other lines are too far
         image, level = np.moveaxis(rays.near, axis, 0), np.moveaxis(noise, axis, 0)
-        lines = np.arange(0, image.shape[1], _EVERY)
+        lines = np.arange(0, image.shape[1], max(image.shape[1] // _LINES, 1))
         bend = np.abs(image[2:, lines] - 2 * image[1:-1, lines] + image[:-2, lines])
         rows = np.arange(1, len(image) - 1) // cell[axis]
         share = bend / level[np.ix_(rows, lines // cell[1 - axis])]
         share = share[np.isfinite(share)]
         if len(share) and np.median(share) / (0.6745 * np.sqrt(6.0)) < WHITE:
-            return False
+            apart = np.abs(image[4:, lines] - 2 * image[2:-2, lines] + image[:-4, lines])
+            apart, bend = apart[np.isfinite(apart)], bend[np.isfinite(bend)]
+            if not len(apart) or np.median(bend) < ALIKE * np.median(apart):
+                return False
     return True
 
 

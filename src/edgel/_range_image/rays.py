@@ -36,6 +36,8 @@ class Rays:
         Whether the rays leave a viewpoint.
     pitch : (float, float)
         Size of a pixel along a column and along a row: radians, or the cloud's unit.
+    gridded : bool
+        Whether the pixels are the sensor's own, which may share noise, and not those of a projection.
     """
 
     ray: np.ndarray
@@ -44,6 +46,7 @@ class Rays:
     origin: np.ndarray
     central: bool
     pitch: tuple[float, float]
+    gridded: bool
 
     @property
     def side(self) -> float:
@@ -85,7 +88,8 @@ def trace_rays(image: RangeImage, xyz: np.ndarray) -> Rays:
         right /= np.linalg.norm(right)
         axes = np.stack([right, np.cross(forward, right), forward])
     run_slices(_trace, len(near), image.index, xyz, axes, origin, central, ray, near, size=_BAND)
-    return Rays(ray, near, axes, origin, central, image.pitch)
+    gridded = image.method == "organized" or max(image.pitch) > APART * min(image.pitch)
+    return Rays(ray, near, axes, origin, central, image.pitch, gridded)
 
 
 @kernel

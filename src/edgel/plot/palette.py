@@ -21,7 +21,7 @@ KIND_COLORS: dict[EdgeKind, tuple[int, int, int]] = {
     EdgeKind.CREASE: (221, 51, 0),  # vermilion
     EdgeKind.COLOR: (238, 170, 0),  # amber
     EdgeKind.IMAGE: (136, 0, 51),  # wine
-    EdgeKind.FRAME: (34, 0, 0),  # black
+    EdgeKind.FRAME: (0, 0, 0),  # black
 }
 """Color of each kind, RGB, 0 to 255; a point of several kinds wears that of the first of them here."""
 
