@@ -9,7 +9,8 @@ from edgel._range_image.rays import APART, Rays
 
 CLEAN = 0.1  # spacings: noise below which it does not matter whose it is
 WHITE = 0.9  # least of the noise that second differences of neighbours show: smoothed or rounded, they show less
-ALIKE = 0.7  # or least of those of pixels two apart: where there is much structure, that hides in them less
+ALIKE = 0.7  # or, in views of few cells, where structure is in most windows, least of those of pixels two apart
+_FEW = 5000  # cells
 _TILE = 16  # cells, over which the noise is estimated
 _QUIET = 0.25  # of the windows there: most may lie on edges, and without edges all leave nearly the same
 _LINES = 40  # rows or columns, at least, whose second differences are taken
@@ -50,7 +51,7 @@ def is_white(rays: Rays, near: np.ndarray, noise: np.ndarray, cell: tuple[int, i
         if len(share) and np.median(share) / (0.6745 * np.sqrt(6.0)) < WHITE:
             apart = np.abs(image[4:, lines] - 2 * image[2:-2, lines] + image[:-4, lines])
             apart, bend = apart[np.isfinite(apart)], bend[np.isfinite(bend)]
-            if not len(apart) or np.median(bend) < ALIKE * np.median(apart):
+            if seen.sum() > _FEW or not len(apart) or np.median(bend) < ALIKE * np.median(apart):
                 return False
     return True
 
