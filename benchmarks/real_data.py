@@ -28,8 +28,8 @@ REMARKS = {
     "speckled with false edges. The paper marks wide bands: at this density its pixels are metres wide. "
     "`interesting.las`, the COPC and the UTM file are a thousand points spread over a town, several spacings "
     "to the next house: nothing to find.",
-    "kinect_objects": "Depth quantised to steps of some millimetres: the default shows the outlines of the boxes and both sides "
-    "of their shadows, and a few short false creases on the table where the steps are. The paper marks the "
+    "kinect_objects": "Depth quantised to steps of some millimetres: the default shows the outlines of the boxes and the "
+    "folds of most; on bowls and bags some creases are false. The paper marks the "
     "outlines as wide bands and nothing inside.",
     "kinect_organized": "As above. `organized_edge_1` is a rendered, noise-free frame: there the default finds the outlines and "
     "the folds. The paper finds the outlines only.",
@@ -48,8 +48,8 @@ REMARKS = {
     "changes height. The default follows sharp creases, on thin plates too (`abc_7034`); it calls small "
     "rounded knobs edges (`abc_7010`), finds about half of soft feature lines (`shrec_*`) and hardly any of "
     "the softest (`shrec_01`), and under noise it leaves gaps (`abc_noise_*`).",
-    "two_depth_sensors": "Ensenso: noise above a tenth of the spacing and correlated from pixel to pixel, so the default is "
-    "speckled with false creases; outlines are there. PrimeSense: depth steps show as rings. The paper marks "
+    "two_depth_sensors": "Noise alike from pixel to pixel. The default draws the outlines, nearly closed, and the folds of the box and of the "
+    "bin in pieces; on the ball a few short false creases. The paper marks "
     "the box only on its high side: the step on the other is below the threshold.",
 }
 
@@ -60,11 +60,10 @@ pixel (`python benchmarks/real_pictures.py OUT`); edge points in the color of th
 """
 
 FRAME_REMARKS = {
-    "ensenso": "A box, a half disc and a ball in a bin. Outlines are there, nearly closed; the folds of the box and of the bin are not. The floor is covered "
-    "with short false steps and creases: errors alike over five pixels and two levels of disparity large look like relief. At the "
-    "ragged rim nearly every point is called an edge.",
-    "primesense": "The same scene. Outlines of the objects are closed, the sides of the bin are missed as folds; false creases and steps along the "
-    "levels of disparity, most on the steep sides.",
+    "ensenso": "A box, a half disc and a ball in a bin. Outlines are there, nearly closed; of the folds the front of the box and the rims of the half "
+    "disc. The floor is clean. On the ball three short false creases.",
+    "primesense": "The same scene. Outlines of the objects are closed, the far side of the bin is found as a fold, its others in pieces; hardly anything "
+    "false.",
     "phoxi": "Outlines and screw heads are clean, both sides of each step are there; the fold round the floor of the bin is soft and "
     "is not found. Where the sensor saw little, single missing points make boundaries of their neighbours.",
     "vlp16": "Sixteen rings, drawn several pixels high. The board stands out by near and far sides; between rings creases are false "
