@@ -55,7 +55,7 @@ class Facets:
 
     def noise_in(self, rays: Rays) -> float:
         """Median of the noise, in spacings."""
-        seen = self.ray[:, :, 3] != 0
+        seen = self.ray.any(axis=2)
         return float(np.median(self.noise[seen] / rays.spacing(self.ray[seen, 3]))) if seen.any() else 0.0
 
 
@@ -68,14 +68,16 @@ def fit_facets(rays: Rays) -> Facets:
     ray, plane = np.empty((*shape, 4), np.float32), np.empty((len(HALVES), *shape, 4), np.float32)
     run_slices(_fit, shape[0], rays.ray, rays.near, cell, HALVES, FULL, ray, plane, size=_BAND)
     noise = noise_level(plane[0, :, :, 3])
-    noise = np.fmax(noise, FINEST * (rays.side * ray[:, :, 3] if rays.central else rays.side))
+    near, seen = ray[:, :, 3], ray.any(axis=2)
+    usual = float(np.median(near[seen])) if seen.any() else 1.0
+    noise = np.fmax(noise, FINEST * rays.spacing(np.where(seen, near, usual)))
     ratio = [1.0]
     for s in range(1, len(HALVES)):
-        ratios = plane[s, ::2, ::2, 3] / noise[::2, ::2]
-        ratios = ratios[np.isfinite(ratios)]
+        left = plane[s, ::2, ::2, 3]
+        ratios = left[np.isfinite(left)] / noise[::2, ::2][np.isfinite(left)]
         ratio.append(max(float(np.median(ratios)), 1.0) if len(ratios) else 1.0)
     noise = noise.astype(np.float32)
-    return Facets(ray, plane, noise, np.array(ratio), cell, stretch, is_white(rays, ray[:, :, 3], noise, cell))
+    return Facets(ray, plane, noise, np.array(ratio), cell, stretch, is_white(rays, near, seen, noise, cell))
 
 
 def _stretched(stretch: float) -> tuple[int, int]:
@@ -164,7 +166,7 @@ def _regress(box, least, fitted):
     """Planes of windows from their sums: LDL^T of the normal equations, without a branch so that it runs on SIMD."""
     for j in range(box.shape[1]):
         n = box[10, j]
-        enough = n >= least
+        enough = n >= least and box[5, j] > 0.0
         m22 = box[5, j] if enough else 1.0
         l1, l0 = box[4, j] / m22, box[2, j] / m22
         m11 = box[3, j] - l1 * box[4, j]

@@ -20,7 +20,7 @@ from edgel._range_image.rays import Rays
 SURE = 6.0  # spreads of chance by which slopes differ where a fold is as likely as not
 FAINTEST = 0.1  # of that: what is less is not kept at any strength
 WEAK = 0.5  # of that, where a fold continues a sure one
-CHAIN = 4  # cells: chains that are shorter are specks
+CHAIN = 5  # cells: chains that are shorter are specks
 MIN_TURN = np.radians(20.0)  # least angle between the planes
 GAPS = np.array([0.5, 0.5, 1.0])  # cells between the middle and each window, for each of `HALVES`
 MISFIT = 4.0  # noises that a window may leave
@@ -213,13 +213,13 @@ def _cosine(first, second, central):
     """Cosine of the angle between the normals of two planes."""
     dot = a2 = b2 = 0.0
     for m in range(3):
-        a, b = first[m], second[m]
+        a, b = np.float64(first[m]), np.float64(second[m])
         if m == 2 and not central:
-            a = b = np.float32(1.0)
+            a = b = 1.0
         dot += a * b
         a2 += a * a
         b2 += b * b
-    return dot / np.sqrt(a2 * b2)
+    return dot / np.sqrt(a2 * b2) if a2 * b2 > 0.0 else 1.0
 
 
 @kernel
@@ -259,11 +259,11 @@ def _thin(start, stop, score, best, offset, shifts, lengths, widths, ray, plane,
                         for m in range(3):
                             total -= 0.5 * (first[m] + second[m]) * rays[r, c, m]
                         count += 1
-            if count == 0:
-                continue
             turn = 0.0
             for m in range(3):
                 turn += (first[m] - second[m]) * (ray[i + down, j + right, m] - ray[i - down, j - right, m])
+            if count == 0 or turn == 0.0:
+                continue
             leaves = abs(total / count / turn) * 2 * length
             half = widths[s] / 2
             parabola = (length * length - half * half / 3) / (4 * length)

@@ -29,13 +29,13 @@ def noise_level(left: np.ndarray) -> np.ndarray:
     return level.repeat(_TILE, axis=0)[: left.shape[0]].repeat(_TILE, axis=1)[:, : left.shape[1]]
 
 
-def is_white(rays: Rays, near: np.ndarray, noise: np.ndarray, cell: tuple[int, int]) -> bool:
+def is_white(rays: Rays, near: np.ndarray, seen: np.ndarray, noise: np.ndarray, cell: tuple[int, int]) -> bool:
     """Whether the noise of neighbouring pixels is independent, or hardly any is there.
 
     Sensors that match windows, interpolate or round leave neighbours alike: their second differences, by the noise
-    (I, J) around cells of mean `near` (I, J), are smaller than the sqrt(6) of independent noise, along some direction.
+    (I, J) around cells of mean `near` (I, J), where `seen` (I, J), are smaller than the sqrt(6) of independent noise,
+    along some direction.
     """
-    seen = near != 0
     if not rays.gridded or not seen.any():
         return True
     if np.median(noise[seen] / rays.spacing(near[seen])) < CLEAN:

@@ -15,6 +15,7 @@ from edgel._kernels.parallel import kernel, run_slices
 from edgel._range_image.range_image import RangeImage
 
 APART = 1.7  # times the pitch along lines, from which lines (of a spinning sensor) lie far apart
+_NEAREST = 1e-60  # squared distance
 _BAND = 16  # rows
 
 
@@ -104,7 +105,12 @@ def _trace(start, stop, index, xyz, axes, origin, central, ray, near):
                 continue
             x, y, z = xyz[p, 0] - ox, xyz[p, 1] - oy, xyz[p, 2] - oz
             if central:
-                inverse = 1.0 / np.sqrt(x * x + y * y + z * z)
+                squared = x * x + y * y + z * z
+                if not squared > _NEAREST:  # its inverse would be beyond single precision
+                    ray[row, col, 0], ray[row, col, 1], ray[row, col, 2] = 0.0, 0.0, 0.0
+                    near[row, col] = np.nan
+                    continue
+                inverse = 1.0 / np.sqrt(squared)
                 ray[row, col, 0], ray[row, col, 1], ray[row, col, 2] = x * inverse, y * inverse, z * inverse
                 near[row, col] = inverse
             else:

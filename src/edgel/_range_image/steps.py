@@ -91,7 +91,8 @@ def _sample(start, stop, places, near, ray, plane, noise, cell, values):
             for k in range(3):
                 step += (plane[a, b, k] - plane[i, j, k]) * ray[row, col, k]
             left = max(plane[i, j, 3], plane[a, b, 3], noise[row // cell[0], col // cell[1]])
-            values[n, way] = abs(step) / left
+            if left > 0.0:
+                values[n, way] = abs(step) / left
 
 
 @part
