@@ -177,65 +177,61 @@ def discs(columns, downs, distance, width, height, radius):
     return shown
 
 
-def held(depth, close):
-    """Pixels that at least 4 of their 24 neighbours hold: within `close`, or 3 median steps of the window more."""
-    kept = np.full(depth.shape, np.nan)
-    for row, col in np.argwhere(~np.isnan(depth)):
-        window = depth[max(row - 2, 0) : row + 3, max(col - 2, 0) : col + 3]
-        away = np.abs(window - depth[row, col])
+def held(near, close, least=(2, 4)):
+    """Pixels that enough neighbours hold: of the 8 or of the 24 within `close`, of the 24 with 3 median steps more."""
+    kept = np.full(near.shape, np.nan)
+    for row, col in np.argwhere(~np.isnan(near)):
+
+        def holding(reach, limit, row=row, col=col):
+            window = near[max(row - reach, 0) : row + reach + 1, max(col - reach, 0) : col + reach + 1]
+            return np.sum(np.abs(window - near[row, col]) <= limit) - 1
+
+        window = near[max(row - 2, 0) : row + 3, max(col - 2, 0) : col + 3]
         steps = [np.abs(np.diff(window, axis=axis)) for axis in (0, 1)]
         slack = 3 * max((np.median(s[~np.isnan(s)]) for s in steps if not np.isnan(s).all()), default=0.0)
-        if max(np.sum(away <= close[row, col]), np.sum(away <= close[row, col] + slack)) >= 5:
-            kept[row, col] = depth[row, col]
+        limit = close[row, col]
+        if holding(1, limit) >= least[0] or holding(2, limit) >= least[1] or holding(2, limit + slack) >= least[1]:
+            kept[row, col] = near[row, col]
     return kept
 
 
-def facet(depth, noise, row, col, reach):
-    """The plane of one pixel (parallel rays): least squares in every window, and the window that fits best."""
-    best, answer = math.inf, (depth[row, col], 0.0, 0.0, noise**2)
-    around = [
-        (dr, dc)
-        for dr in range(-reach, reach + 1)
-        for dc in range(-reach, reach + 1)
-        if 0 < dr * dr + dc * dc <= (reach + 0.3) ** 2
-    ]
-    for sectors, extra in ((16, 0.0), (7, 0.1), (3, 0.3)):
-        for first in range(1 if sectors == 16 else 16):
-            rows = [(1.0, 0.0, 0.0, 0.0)]
-            for dr, dc in around:
-                r, c = row + dr, col + dc
-                sector = math.floor(math.atan2(dr, dc) / (2 * math.pi) * 16 + 1e-9) % 16
-                inside = 0 <= r < depth.shape[0] and 0 <= c < depth.shape[1] and not math.isnan(depth[r, c])
-                if inside and (sector - first) % 16 < sectors:
-                    rows.append((1.0, dr, dc, depth[r, c] - depth[row, col]))
-            a, u = np.array(rows)[:, :3], np.array(rows)[:, 3]
-            if len(rows) < 5 or np.linalg.matrix_rank(a) < 3:
-                continue
-            plane = np.linalg.solve(a.T @ a, a.T @ u)
-            leverage = np.linalg.inv(a.T @ a)[0, 0]
-            spread = max((np.sum((a @ plane - u) ** 2) + 4 * noise**2) / (len(rows) + 1), noise**2)
-            score = spread * (1 + extra + leverage) + plane[0] ** 2 / 4
-            if score < best:
-                best, answer = score, (depth[row, col] + plane[0], plane[1], plane[2], spread * leverage)
-    return answer
+def window_planes(ray, near, cell, halves, full):
+    """Least squares of `near` by rays in windows of cells (S, I, J, 4): plane, and root mean square; inf if unknown."""
+    rows, cols = (math.ceil(length / size) for length, size in zip(near.shape, cell, strict=True))
+    planes = np.full((len(halves), rows, cols, 4), np.inf)
+    for s, half in enumerate(halves):
+        for i in range(rows):
+            for j in range(cols):
+                window = np.s_[
+                    max(i - half, 0) * cell[0] : (i + half + 1) * cell[0],
+                    max(j - half, 0) * cell[1] : (j + half + 1) * cell[1],
+                ]
+                seen = ~np.isnan(near[window])
+                if seen.sum() < full * (2 * half + 1) ** 2 * cell[0] * cell[1]:
+                    continue
+                a, b = ray[window][seen], near[window][seen]
+                plane, _, rank, _ = np.linalg.lstsq(a, b, rcond=None)
+                if rank == 3:
+                    left = math.sqrt(((a @ plane - b) ** 2).sum() / max(len(b) - 3, 1))
+                    planes[s, i, j] = (*plane, left)
+    return planes
 
 
-def beside_void(hole):
-    """Pixels next to a hole: squares of 3 pixels that are all hole, and what lies within two steps in it."""
-    height, width = hole.shape
+def voids(hole, size):
+    """Pixels in rectangles of a size (rows, columns) that are all hole."""
     void = np.zeros_like(hole)
-    for row in range(height - 2):
-        for col in range(width - 2):
-            if hole[row : row + 3, col : col + 3].all():
-                void[row : row + 3, col : col + 3] = True
-    for step in range(3):
-        grown = void.copy()
-        for row, col in np.argwhere(void):
-            for r, c in ((row - 1, col), (row + 1, col), (row, col - 1), (row, col + 1)):
-                if 0 <= r < height and 0 <= c < width:
-                    grown[r, c] = True
-        void = grown & (hole if step < 2 else ~hole)
+    for row in range(hole.shape[0] - size[0] + 1):
+        for col in range(hole.shape[1] - size[1] + 1):
+            if hole[row : row + size[0], col : col + size[1]].all():
+                void[row : row + size[0], col : col + size[1]] = True
     return void
+
+
+def rims(hole, void):
+    """Pixels seen that have one of their 4 neighbours in a void."""
+    padded = np.pad(void, 1)
+    beside = padded[:-2, 1:-1] | padded[2:, 1:-1] | padded[1:-1, :-2] | padded[1:-1, 2:]
+    return beside & ~hole
 
 
 def biweight(points):
