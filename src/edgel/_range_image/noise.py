@@ -10,7 +10,7 @@ from edgel._range_image.rays import APART, Rays
 CLEAN = 0.1  # spacings: noise below which it does not matter whose it is
 WHITE = 0.9  # least of the noise that second differences of neighbours show: smoothed or rounded, they show less
 ALIKE = 0.7  # or, in views of few cells, where structure is in most windows, least of those of pixels two apart
-_FEW = 5000  # cells
+_FEW = 1000  # cells
 _TILE = 16  # cells, over which the noise is estimated
 _QUIET = 0.25  # of the windows there: most may lie on edges, and without edges all leave nearly the same
 _LINES = 40  # rows or columns, at least, whose second differences are taken

@@ -80,7 +80,8 @@ def trace_rays(image: RangeImage, xyz: np.ndarray) -> Rays:
     """
     ray, near = np.empty((*image.shape, 3), np.float32), np.empty(image.shape, np.float32)
     central = image.viewpoint is not None
-    axes, origin = np.eye(3), xyz[len(xyz) // 2]
+    # Of parallel rays: the middle of the box, since a mean would depend on the order of the points in its last digit.
+    axes, origin = np.eye(3), (xyz.min(axis=0) + xyz.max(axis=0)) / 2 if len(xyz) else np.zeros(3)
     if image.viewpoint is not None:
         origin = image.viewpoint
     else:

@@ -136,7 +136,10 @@ def see_edges(image: RangeImage, xyz: np.ndarray, kinds: EdgeKind) -> SeenEdges:
         step, side = find_steps(rays, facets, void)
     else:
         rim, step, side = np.zeros(image.shape, bool), np.zeros(image.shape), np.zeros(image.shape, np.uint8)
-    kind = np.where(step > 0, side, 0) | np.where(rim, int(EdgeKind.BOUNDARY), 0)
+    # A rim is sure: a step there counts only where it is likely by itself.
+    kind = np.where(step >= np.where(rim, 1.0, np.finfo(float).tiny), side, 0) | np.where(
+        rim, int(EdgeKind.BOUNDARY), 0
+    )
     frame = np.zeros(image.shape, bool)
     if EdgeKind.FRAME in kinds and image.method == "organized":
         frame[[0, -1]], frame[:, [0, -1]] = True, True

@@ -11,7 +11,7 @@ from edgel._range_image.rays import APART, Rays
 
 CLOSE = 3.0  # spacings, and median differences of neighbours, within which a neighbour holds a pixel
 HELD = 2, 4  # of the 8 neighbours, or of the 24, that hold a pixel
-ON_LINE = 1, 2  # the same where lines lie far apart, and neighbours on others are no help
+ON_LINE = 1, 2  # the same of the 2 or 4 on its own line, where lines lie far apart
 _BAND = 16  # rows
 _SAMPLE = 4  # rows and columns between the pixels whose neighbours are compared
 
@@ -25,13 +25,15 @@ def without_stray(rays: Rays) -> Rays:
     usual = float(np.median(step[known] / unit[known])) if known.any() else 0.0
     kept = np.empty_like(near)
     close = CLOSE * (1.0 + usual) * rays.side
-    held = HELD if max(rays.pitch) < APART * min(rays.pitch) else ON_LINE
-    run_slices(_without_stray, len(near), near, close, rays.central, held, kept, size=_BAND)
+    down, right = rays.pitch
+    lines = (int(down < APART * right), int(right < APART * down))  # whether neighbours across them are any help
+    held = HELD if all(lines) else ON_LINE
+    run_slices(_without_stray, len(near), near, close, rays.central, held, lines, kept, size=_BAND)
     return replace(rays, near=kept)
 
 
 @kernel
-def _without_stray(start, stop, near, close, central, held, kept):
+def _without_stray(start, stop, near, close, central, held, lines, kept):
     width = near.shape[1]
     steps = np.empty((2, 25), np.float32)
     for row in range(start, stop):
@@ -41,33 +43,35 @@ def _without_stray(start, stop, near, close, central, held, kept):
             if own != own:
                 continue
             limit = np.float32(close * own) if central else np.float32(close)
-            if _count(near, row, col, 1, limit) >= held[0] or _count(near, row, col, 2, limit) >= held[1]:
+            if _count(near, row, col, 1, lines, limit) >= held[0] or _count(near, row, col, 2, lines, limit) >= held[1]:
                 continue
             # Where the surface is steep, neighbours are farther away: as far as they are from each other.
-            steep = np.float32(CLOSE) * _steepness(near, row, col, steps)
-            if _count(near, row, col, 2, limit + steep) < held[1]:
+            steep = np.float32(CLOSE) * _steepness(near, row, col, lines, steps)
+            if _count(near, row, col, 2, lines, limit + steep) < held[1]:
                 kept[row, col] = np.nan
 
 
 @part
-def _count(near, row, col, reach, limit):
+def _count(near, row, col, reach, lines, limit):
     """Number of neighbours within a reach whose depth is close to the pixel's own."""
     count = -1
-    for r in range(max(row - reach, 0), min(row + reach + 1, near.shape[0])):
-        for c in range(max(col - reach, 0), min(col + reach + 1, near.shape[1])):
+    for r in range(max(row - reach * lines[0], 0), min(row + reach * lines[0] + 1, near.shape[0])):
+        for c in range(max(col - reach * lines[1], 0), min(col + reach * lines[1] + 1, near.shape[1])):
             if abs(near[r, c] - near[row, col]) <= limit:
                 count += 1
     return count
 
 
 @part
-def _steepness(near, row, col, steps):
+def _steepness(near, row, col, lines, steps):
     """Median difference of neighbours along rows or along columns, whichever is larger, in the square of 25."""
     height, width = near.shape
     counts = np.zeros(2, np.int64)
     for r in range(max(row - 2, 0), min(row + 3, height)):
         for c in range(max(col - 2, 0), min(col + 3, width)):
             for way in range(2):
+                if lines[way] == 0:
+                    continue
                 p, q = (r + 1, c) if way == 0 else (r, c + 1)
                 if p < min(row + 3, height) and q < min(col + 3, width):
                     step = abs(near[p, q] - near[r, c])
