@@ -112,6 +112,17 @@ def test_smooth_surfaces_have_none(surface, noise):
         assert not (look(kind, height)[2].level >= 1).any()
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_steep_walls_of_a_trough_have_none(kind):
+    """Up to 58 degrees steep, and cut off there."""
+    row, col = grid(120, 140)
+    across = 0.8 * row + 0.6 * col
+    inside = (across**2 < 76.5**2) & (row**2 + col**2 < 76.5**2)
+    height = np.where(inside, 90 - np.sqrt(np.maximum(90**2 - across**2, 0)), np.nan)
+    for seed in range(3):
+        assert not (look(kind, height + 0.1 * white(row.shape, seed))[2].level >= 1).any()
+
+
 def test_rounded_depth_has_none():
     for step in (0.5, 1.0, 2.0):
         height = step * np.round((0.23 * ROW + 0.31 * COL + 0.1 * white(SHAPE)) / step)

@@ -55,12 +55,25 @@ def test_what_stands_alone_over_nothing_is_dropped():
 
 
 def test_where_lines_lie_far_apart_a_line_holds_itself():
-    height = np.zeros((9, 40)) + 20.0 * np.arange(9)[:, None] % 50
+    height = np.zeros((9, 40))
     height[4, 20] = 15.0
     height[6] = np.nan
     found = kept("spherical", height, (8.0, 1.0))
     assert not found[4, 20]
     assert np.count_nonzero(~found) == 1 + 40
+
+
+def test_outliers_are_dropped_where_a_floor_falls_from_line_to_line():
+    """Neighbours on other lines are no help: how far they are off says nothing of the slope along a line."""
+    row, _ = grid(21, 60)
+    height = 0.5 * 4.0 * row + 0.05 * white(row.shape)
+    steep = 1.0 * 4.0 * row + 0.05 * white(row.shape)
+    for floor in (height, steep):
+        out = np.zeros(row.shape, bool)
+        out[3::5, 7::9] = True
+        found = kept("parallel", np.where(out, floor + 20.0, floor), (4.0, 1.0))
+        assert found[~out].all()
+        assert not found[out].any()
 
 
 @pytest.mark.parametrize("pitch", [(1.0, 1.0), (4.0, 1.0)])
