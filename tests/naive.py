@@ -177,17 +177,18 @@ def discs(columns, downs, distance, width, height, radius):
     return shown
 
 
-def held(near, close, least=(2, 4)):
+def held(near, close, least=(2, 4), lines=(1, 1)):
     """Pixels that enough neighbours hold: of the 8 or of the 24 within `close`, of the 24 with 3 median steps more."""
     kept = np.full(near.shape, np.nan)
     for row, col in np.argwhere(~np.isnan(near)):
 
         def holding(reach, limit, row=row, col=col):
-            window = near[max(row - reach, 0) : row + reach + 1, max(col - reach, 0) : col + reach + 1]
+            down, right = reach * lines[0], reach * lines[1]
+            window = near[max(row - down, 0) : row + down + 1, max(col - right, 0) : col + right + 1]
             return np.sum(np.abs(window - near[row, col]) <= limit) - 1
 
         window = near[max(row - 2, 0) : row + 3, max(col - 2, 0) : col + 3]
-        steps = [np.abs(np.diff(window, axis=axis)) for axis in (0, 1)]
+        steps = [np.abs(np.diff(window, axis=axis)) for axis in (0, 1) if lines[axis]]
         slack = 3 * max((np.median(s[~np.isnan(s)]) for s in steps if not np.isnan(s).all()), default=0.0)
         limit = close[row, col]
         if holding(1, limit) >= least[0] or holding(2, limit) >= least[1] or holding(2, limit + slack) >= least[1]:

@@ -88,7 +88,8 @@ def test_equal_naive(pitch):
     step = np.abs(rays.near[::4, 1::4] - rays.near[::4, :-1:4][:, : rays.near[::4, 1::4].shape[1]])
     usual = np.nanmedian(step) / rays.side
     close = np.full(shape, CLOSE * (1 + usual) * rays.side)
-    wanted = naive.held(rays.near, close, HELD if pitch[0] < 1.7 else ON_LINE)
+    apart = pitch[0] > 1.7
+    wanted = naive.held(rays.near, close, ON_LINE if apart else HELD, (int(not apart), 1))
     assert np.isnan(wanted).sum() > np.isnan(height).sum()
     np.testing.assert_array_equal(without_stray(rays).near, wanted.astype(np.float32))
 

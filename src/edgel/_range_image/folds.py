@@ -188,12 +188,12 @@ def _score(start, stop, ray, plane, noise, ratio, shifts, lengths, sure, widths,
                 continue
             for s in range(len(widths)):
                 nominal = np.sqrt(24.0) / (widths[s] * widths[s]) * sure[s]
-                # Every other direction first, then those beside the best of them.
+                # Every other direction first, then those beside the best of them, or all where none could be compared.
                 steepest, middle = 0.0, -1
-                for n in range(ways // 2 + 2):
-                    if n >= ways // 2 and middle < 0:
-                        break
-                    k = 2 * n if n < ways // 2 else (middle + (1 if n == ways // 2 else ways - 1)) % ways
+                for n in range(ways):
+                    k = 2 * n if n < ways // 2 else 2 * n - ways + 1
+                    if n >= ways // 2 and middle >= 0 and k != (middle + 1) % ways and k != (middle + ways - 1) % ways:
+                        continue
                     down, right = shifts[s, k, 0], shifts[s, k, 1]
                     turn, gap, left = _compare(i, j, down, right, lengths[s, k], ray, plane[s], noise[i, j] * ratio[s])
                     value = abs(turn) / (left * nominal)
