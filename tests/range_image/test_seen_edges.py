@@ -127,7 +127,7 @@ def test_a_hole_has_a_rim_and_that_only():
 
 def test_a_faint_step_does_not_ride_on_a_rim():
     """A kind less likely than not counts only where no other is more likely: a rim is no step for being sure."""
-    height = np.where(COL > 0, -4.6, 0.0) + white(SHAPE, 3)
+    height = np.where(COL > 0, -3.6, 0.0) + white(SHAPE, 2)
     height[:20] = np.nan
     xyz = frame(height).reshape(-1, 3)
     rows = np.flatnonzero(np.isfinite(xyz[:, 2]))

@@ -68,7 +68,7 @@ def fit_facets(rays: Rays) -> Facets:
     ray, plane = np.empty((*shape, 4), np.float32), np.empty((len(HALVES), *shape, 4), np.float32)
     run_slices(_fit, shape[0], rays.ray, rays.near, cell, HALVES, FULL, ray, plane, size=_BAND)
     noise = noise_level(plane[0, :, :, 3])
-    near, seen = ray[:, :, 3], ray.any(axis=2)
+    near, seen = ray[:, :, 3], np.asarray(ray.any(axis=2))
     usual = float(np.median(near[seen])) if seen.any() else 1.0
     noise = np.fmax(noise, FINEST * rays.spacing(np.where(seen, near, usual)))
     ratio = [1.0]
