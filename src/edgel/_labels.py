@@ -49,9 +49,8 @@ def label_edges(
     if classified is not None:
         labels.add(classified.points, EdgeKind.CREASE, strength_of_probability(classified.crease))
     if seen is not None:
-        bold = np.ones(len(seen.creases), bool)
-        if classified is not None:  # in much noise windows find what neighbourhoods miss, but bends as well
-            bold = seen.turn > BOLD
+        # In much noise windows find what neighbourhoods miss, but bends as well.
+        bold = slice(None) if classified is None else seen.turn > BOLD
         labels.add(seen.creases[bold], EdgeKind.CREASE, seen.crease_strength[bold])
         labels.add(seen.points, seen.kind, seen.strength)
     elif classified is not None:

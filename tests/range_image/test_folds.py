@@ -112,8 +112,12 @@ def test_smooth_surfaces_have_none(surface, noise):
         assert not (look(kind, height)[2].level >= 1).any()
 
 
-@pytest.mark.xfail(reason="cameras see walls of 58 degrees bend faster than a parabola: up to 20 false cells")
-@pytest.mark.parametrize("kind", KINDS)
+CAMERAS_BEND = pytest.mark.xfail(
+    reason="cameras see walls of 58 degrees bend faster than a parabola: up to 20 false cells"
+)
+
+
+@pytest.mark.parametrize("kind", ["parallel", *(pytest.param(k, marks=CAMERAS_BEND) for k in KINDS if k != "parallel")])
 def test_the_steep_walls_of_a_trough_have_none(kind):
     """Up to 58 degrees steep, and cut off there."""
     row, col = grid(120, 140)

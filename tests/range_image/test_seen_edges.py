@@ -50,7 +50,7 @@ def test_correlated_noise_alone_is_seen_as_such():
     seen = see_edges(organized(flat, np.arange(len(flat)), SHAPE), flat, EdgeKind.CREASE)
     assert seen.is_fine(EdgeKind.CREASE)
     assert not seen.is_fine(EdgeKind.BOUNDARY)
-    assert seen.facets.noise_in(seen.rays) == pytest.approx(0.4, rel=0.15)
+    assert seen.facets.median_noise == pytest.approx(0.4, rel=0.15)
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.8])

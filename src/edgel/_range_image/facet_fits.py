@@ -41,6 +41,8 @@ class Facets:
         Rows and columns of pixels of a cell.
     stretch : float
         Height of a pixel over its width.
+    median_noise : float
+        Median of the noise, in spacings.
     white : bool
         Whether the noise of neighbouring pixels is independent, or hardly any is there.
     """
@@ -51,12 +53,8 @@ class Facets:
     ratio: np.ndarray
     cell: tuple[int, int]
     stretch: float
+    median_noise: float
     white: bool
-
-    def noise_in(self, rays: Rays) -> float:
-        """Median of the noise, in spacings."""
-        seen = self.ray.any(axis=2)
-        return float(np.median(self.noise[seen] / rays.spacing(self.ray[seen, 3]))) if seen.any() else 0.0
 
 
 def fit_facets(rays: Rays) -> Facets:
@@ -77,7 +75,9 @@ def fit_facets(rays: Rays) -> Facets:
         ratios = left[np.isfinite(left)] / noise[::2, ::2][np.isfinite(left)]
         ratio.append(max(float(np.median(ratios)), 1.0) if len(ratios) else 1.0)
     noise = noise.astype(np.float32)
-    return Facets(ray, plane, noise, np.array(ratio), cell, stretch, is_white(rays, near, seen, noise, cell))
+    median = float(np.median(noise[seen] / rays.spacing(near[seen]))) if seen.any() else 0.0
+    white = is_white(rays, noise, cell, median=median, num_seen=int(seen.sum()))
+    return Facets(ray, plane, noise, np.array(ratio), cell, stretch, median, white)
 
 
 def _stretched(stretch: float) -> tuple[int, int]:

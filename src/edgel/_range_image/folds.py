@@ -1,9 +1,9 @@
 """Folds: where the planes of two windows, side by side, meet on the line between them.
 
 Whether their slopes differ by chance is asked of the view itself: the difference over its nominal error is divided by
-its own spread (median / 0.6745) over places all over the view, for each size of window; so quantised, smoothed or
-correlated noise needs no model. The smooth alternative is a parabola: on one, the surface between the windows leaves
-their planes much farther than beside a fold.
+its own spread over places all over the view (by the lower quartile: true folds are above), for each size of window; so
+quantised, smoothed or correlated noise needs no model. The smooth alternative is a parabola: on one, the surface
+between the windows leaves their planes much farther than beside a fold.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 from edgel._kernels.hysteresis import levels
 from edgel._kernels.parallel import kernel, part, run_slices
 from edgel._range_image.facet_fits import HALVES, Facets
+from edgel._range_image.noise import even_places, spread
 from edgel._range_image.rays import Rays
 
 SURE = 6.0  # spreads of chance by which slopes differ where a fold is as likely as not
@@ -31,7 +32,6 @@ PARABOLA = 0.3, 0.7  # pixels, and shares of what a parabola does, by which a fo
 DIRECTIONS = np.array([(0, 1), (1, 2), (1, 1), (2, 1), (1, 0), (2, -1), (1, -1), (1, -2)], float)
 DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1)[:, None]
 _SPREAD = 0.25, 0.3186  # quantile of chance that tells its spread, and the normal distribution's: true folds are above
-_SAMPLES = 1500  # places at which chance is looked at
 _BAND = 8  # rows of cells
 
 
@@ -75,17 +75,17 @@ def no_folds() -> Folds:
 def find_folds(rays: Rays, facets: Facets) -> Folds:
     """Find the folds of a range image."""
     shape = facets.noise.shape
-    shifts, lengths = _window_shifts(facets)
-    chance = _chance(rays, facets, shifts, lengths)
+    shifts, lengths, widths = _windows(facets)
+    chance = _chance(facets, shifts, lengths, widths)
     score, best = np.zeros(shape, np.float32), np.zeros(shape, np.int32)
     offset = np.zeros(shape, np.float32)
     run_slices(
         _score, shape[0], facets.ray, facets.plane, facets.noise, facets.ratio, shifts, lengths, chance * SURE,
-        _widths(facets), rays.central, score, best, offset, size=_BAND,
+        widths, rays.central, score, best, offset, size=_BAND,
     )  # fmt: skip
     kept = np.zeros(shape)
     run_slices(
-        _thin, shape[0], score, best, offset, shifts, lengths, _widths(facets), facets.ray, facets.plane, rays.ray,
+        _thin, shape[0], score, best, offset, shifts, lengths, widths, facets.ray, facets.plane, rays.ray,
         rays.near, facets.cell, kept, size=_BAND,
     )  # fmt: skip
     level = levels(kept, WEAK, CHAIN)
@@ -108,34 +108,23 @@ def find_folds(rays: Rays, facets: Facets) -> Folds:
     )
 
 
-def _widths(facets: Facets) -> np.ndarray:
-    """Widths of the windows, in pixels."""
-    return (2 * HALVES + 1) * np.sqrt(facets.cell[0] * facets.stretch * facets.cell[1])
-
-
-def _window_shifts(facets: Facets) -> tuple[np.ndarray, np.ndarray]:
-    """Cells from the middle to each window (S, K, 2), and the distance in pixels (S, K)."""
+def _windows(facets: Facets) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Cells from the middle to each window (S, K, 2), that distance in pixels (S, K), and the widths in pixels (S,)."""
     reach = HALVES + 0.5 + GAPS
     shifts = np.round(reach[:, None, None] * DIRECTIONS).astype(np.int64)
-    return shifts, np.linalg.norm(shifts * facets.cell * (facets.stretch, 1.0), axis=2)
+    lengths = np.linalg.norm(shifts * facets.cell * (facets.stretch, 1.0), axis=2)
+    return shifts, lengths, (2 * HALVES + 1) * np.sqrt(facets.cell[0] * facets.stretch * facets.cell[1])
 
 
-def _chance(rays: Rays, facets: Facets, shifts: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+def _chance(facets: Facets, shifts: np.ndarray, lengths: np.ndarray, widths: np.ndarray) -> np.ndarray:
     """Spread of the difference of slopes over its nominal error, for each size of window, over the whole view."""
-    rows, cols = facets.noise.shape
-    stride = max(int(np.sqrt(rows * cols / _SAMPLES)), 1)
-    places = np.array([(r, c) for r in range(stride // 2, rows, stride) for c in range(stride // 2, cols, stride)])
+    places = even_places(facets.noise.shape)
     values = np.full((len(places), len(HALVES), len(DIRECTIONS)), np.nan, np.float32)
     run_slices(
         _sample, len(places), places, facets.ray, facets.plane, facets.noise, facets.ratio, shifts, lengths,
-        _widths(facets), values, size=128,
+        widths, values, size=128,
     )  # fmt: skip
-    spread = np.ones(len(HALVES))
-    for s in range(len(HALVES)):
-        known = values[:, s][np.isfinite(values[:, s])]
-        if len(known):
-            spread[s] = max(float(np.quantile(known, _SPREAD[0])) / _SPREAD[1], 1.0)
-    return spread
+    return np.array([spread(values[:, s], *_SPREAD) for s in range(len(HALVES))])
 
 
 @part

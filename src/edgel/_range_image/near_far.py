@@ -11,7 +11,7 @@ from edgel._range_image.range_image import viewer_axes
 from edgel.edges import EdgeKind
 
 SHOWN = 0.97  # least share of the points that the direction has to show
-_DEPTH = 3.0  # spacings behind the nearest point of its pixel within which a point still shows
+DEPTH = 3.0  # spacings behind the nearest point of its pixel within which a point still shows
 _REACH = 2  # pixels: what is beside an outline lies as near as that
 _GAP = 3.0  # spacings: least gap among the depths around an outline point
 _FAR = 2 * _REACH + 1  # least number of depths beyond the gap
@@ -85,7 +85,7 @@ class _Raster:
     @property
     def shown(self) -> float:
         """Share of the points that lie in the layer nearest to the viewer."""
-        return float(np.mean(self.depth - self.nearest[self.row, self.col] <= _DEPTH * self.size))
+        return float(np.mean(self.depth - self.nearest[self.row, self.col] <= DEPTH * self.size))
 
 
 def _rastered(xyz: np.ndarray, direction: np.ndarray) -> _Raster | None:

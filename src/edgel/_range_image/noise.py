@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from edgel._kernels.parallel import kernel, run_slices
-from edgel._range_image.rays import APART, Rays
+from edgel._range_image.rays import Rays
 
 CLEAN = 0.1  # spacings: noise below which it does not matter whose it is
 WHITE = 0.9  # least of the noise that second differences of neighbours show: smoothed or rounded, they show less
@@ -13,6 +13,7 @@ ALIKE = 0.7  # or, in views of few cells, where structure is in most windows, le
 _FEW = 1000  # cells
 _TILE = 16  # cells, over which the noise is estimated
 _QUIET = 0.25  # of the windows there: most may lie on edges, and without edges all leave nearly the same
+_PLACES = 1500
 _LINES = 40  # rows or columns, at least, whose second differences are taken
 
 
@@ -29,19 +30,18 @@ def noise_level(left: np.ndarray) -> np.ndarray:
     return level.repeat(_TILE, axis=0)[: left.shape[0]].repeat(_TILE, axis=1)[:, : left.shape[1]]
 
 
-def is_white(rays: Rays, near: np.ndarray, seen: np.ndarray, noise: np.ndarray, cell: tuple[int, int]) -> bool:
+def is_white(rays: Rays, noise: np.ndarray, cell: tuple[int, int], *, median: float, num_seen: int) -> bool:
     """Whether the noise of neighbouring pixels is independent, or hardly any is there.
 
     Sensors that match windows, interpolate or round leave neighbours alike: their second differences, by the noise
-    (I, J) around cells of mean `near` (I, J), where `seen` (I, J), are smaller than the sqrt(6) of independent noise,
-    along some direction.
+    (I, J) around cells, are smaller than the sqrt(6) of independent noise, along some direction. `median` is the noise
+    in spacings, `num_seen` the number of cells in which something is seen.
     """
-    if not rays.gridded or not seen.any():
+    if not rays.gridded or median < CLEAN:
         return True
-    if np.median(noise[seen] / rays.spacing(near[seen])) < CLEAN:
-        return True
-    stretch = rays.pitch[0] / rays.pitch[1]
-    for axis in (0, 1) if 1 / APART < stretch < APART else (int(stretch > 1),):  # neighbours on other lines are too far
+    for axis in (0, 1):
+        if rays.apart[axis]:
+            continue  # neighbours on other lines are too far
         image, level = np.moveaxis(rays.near, axis, 0), np.moveaxis(noise, axis, 0)
         lines = np.arange(0, image.shape[1], max(image.shape[1] // _LINES, 1))
         bend = np.abs(image[2:, lines] - 2 * image[1:-1, lines] + image[:-2, lines])
@@ -51,9 +51,23 @@ def is_white(rays: Rays, near: np.ndarray, seen: np.ndarray, noise: np.ndarray, 
         if len(share) and np.median(share) / (0.6745 * np.sqrt(6.0)) < WHITE:
             apart = np.abs(image[4:, lines] - 2 * image[2:-2, lines] + image[:-4, lines])
             apart, bend = apart[np.isfinite(apart)], bend[np.isfinite(bend)]
-            if seen.sum() > _FEW or not len(apart) or np.median(bend) < ALIKE * np.median(apart):
+            if num_seen > _FEW or not len(apart) or np.median(bend) < ALIKE * np.median(apart):
                 return False
     return True
+
+
+def even_places(shape: tuple[int, int]) -> np.ndarray:
+    """Some `_PLACES` places (M, 2) of an image, evenly spread: where it is looked what chance does."""
+    rows, cols = shape
+    stride = max(int(np.sqrt(rows * cols / _PLACES)), 1)
+    down, right = np.mgrid[stride // 2 : rows : stride, stride // 2 : cols : stride]
+    return np.column_stack([down.ravel(), right.ravel()])
+
+
+def spread(values: np.ndarray, quantile: float, normal: float) -> float:
+    """Spread of what chance does, 1 or more, by a quantile of its magnitude and that of the normal distribution."""
+    known = values[np.isfinite(values)]
+    return max(float(np.quantile(known, quantile)) / normal, 1.0) if len(known) else 1.0
 
 
 @kernel

@@ -63,12 +63,6 @@ class RangeImage:
         """Rows and columns."""
         return self.depth.shape[0], self.depth.shape[1]
 
-    @property
-    def spacing(self) -> np.ndarray:
-        """Root of the area, across the ray, that each pixel covers at its depth; (H, W) float64, the cloud's unit."""
-        side = float(np.sqrt(self.pitch[0] * self.pitch[1]))
-        return side * self.depth if self.viewpoint is not None else np.where(np.isnan(self.depth), np.nan, side)
-
 
 def organized(
     xyz: np.ndarray, rows: np.ndarray, shape: tuple[int, int], viewpoint: np.ndarray | None = None
@@ -95,7 +89,7 @@ def organized(
     from_eye = [angles(xyz[a] - eye, xyz[b] - eye) for a, b in pairs]
     direction = parallel_direction(xyz, pairs)
     across = [_across(xyz[b] - xyz[a], direction) for a, b in pairs]
-    middle = _unit((xyz[pairs[0][0]] - eye).mean(axis=0)) if len(pairs[0][0]) else _unit(xyz.mean(axis=0) - eye)
+    middle = unit((xyz[pairs[0][0]] - eye).mean(axis=0)) if len(pairs[0][0]) else unit(xyz.mean(axis=0) - eye)
     if unevenness(across) < unevenness(from_eye):
         facing = direction @ (middle if viewpoint is not None or direction[2] == 0 else -direction * direction[2])
         direction = -direction if facing < 0 else direction
@@ -275,6 +269,7 @@ def _nearest(pixels, depth, xyz, index):
                     break
 
 
-def _unit(vector: np.ndarray) -> np.ndarray:
+def unit(vector: np.ndarray) -> np.ndarray:
+    """Unit vector along a vector (3,), +Z where it has no length."""
     length = np.linalg.norm(vector)
     return vector / length if length > 0 else np.array([0.0, 0.0, 1.0])

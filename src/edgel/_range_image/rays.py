@@ -37,8 +37,8 @@ class Rays:
         Whether the rays leave a viewpoint.
     pitch : (float, float)
         Size of a pixel along a column and along a row: radians, or the cloud's unit.
-    gridded : bool
-        Whether the pixels are the sensor's own, which may share noise, and not those of a projection.
+    organized : bool
+        Whether the cloud came with these pixels.
     """
 
     ray: np.ndarray
@@ -47,12 +47,23 @@ class Rays:
     origin: np.ndarray
     central: bool
     pitch: tuple[float, float]
-    gridded: bool
+    organized: bool
 
     @property
     def side(self) -> float:
         """Root of the area of a pixel, in radians or the cloud's unit."""
         return float(np.sqrt(self.pitch[0] * self.pitch[1]))
+
+    @property
+    def apart(self) -> tuple[bool, bool]:
+        """Whether neighbours along columns, and along rows, lie on lines far apart, as a spinning sensor's do."""
+        down, right = self.pitch
+        return down > APART * right, right > APART * down
+
+    @property
+    def gridded(self) -> bool:
+        """Whether the pixels are the sensor's own, which may share noise, and not those of a projection."""
+        return self.organized or any(self.apart)
 
     def spacing(self, near: np.ndarray) -> np.ndarray:
         """How much `near` changes where the surface recedes by the width of a pixel: what one spacing is in it."""
@@ -90,8 +101,7 @@ def trace_rays(image: RangeImage, xyz: np.ndarray) -> Rays:
         right /= np.linalg.norm(right)
         axes = np.stack([right, np.cross(forward, right), forward])
     run_slices(_trace, len(near), image.index, xyz, axes, origin, central, ray, near, size=_BAND)
-    gridded = image.method == "organized" or max(image.pitch) > APART * min(image.pitch)
-    return Rays(ray, near, axes, origin, central, image.pitch, gridded)
+    return Rays(ray, near, axes, origin, central, image.pitch, image.method == "organized")
 
 
 @kernel
@@ -100,16 +110,13 @@ def _trace(start, stop, index, xyz, axes, origin, central, ray, near):
     for row in range(start, stop):
         for col in range(index.shape[1]):
             p = index[row, col]
+            ray[row, col, 0], ray[row, col, 1], ray[row, col, 2], near[row, col] = 0.0, 0.0, 0.0, np.nan
             if p < 0:
-                ray[row, col, 0], ray[row, col, 1], ray[row, col, 2] = 0.0, 0.0, 0.0
-                near[row, col] = np.nan
                 continue
             x, y, z = xyz[p, 0] - ox, xyz[p, 1] - oy, xyz[p, 2] - oz
             if central:
                 squared = x * x + y * y + z * z
                 if not squared > _NEAREST:  # its inverse would be beyond single precision
-                    ray[row, col, 0], ray[row, col, 1], ray[row, col, 2] = 0.0, 0.0, 0.0
-                    near[row, col] = np.nan
                     continue
                 inverse = 1.0 / np.sqrt(squared)
                 ray[row, col, 0], ray[row, col, 1], ray[row, col, 2] = x * inverse, y * inverse, z * inverse

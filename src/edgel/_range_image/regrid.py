@@ -8,7 +8,7 @@ import numpy as np
 
 from edgel._range_image.grid_steps import neighbours, pitch_of
 from edgel._range_image.lattice import NEAR, find_lattice
-from edgel._range_image.range_image import FRAME, RangeImage
+from edgel._range_image.range_image import FRAME, RangeImage, unit
 
 _OWN = 0.98  # least share of the points that have a place of the grid to themselves
 _BESIDE = 0.6  # least share of the places beside points that are filled too: a grid, not points on round numbers
@@ -54,9 +54,7 @@ class Grid:
         rays = xyz - viewpoint
         depth = np.linalg.norm(rays, axis=1)
         rays /= np.where(depth > 0, depth, 1)[:, None]
-        middle = rays[self.points].mean(axis=0)
-        length = np.linalg.norm(middle)
-        middle = middle / length if length > 0 else np.array([0.0, 0.0, 1.0])
+        middle = unit(rays[self.points].mean(axis=0))
         row, col = np.divmod(self.cells, self.shape[1])
         (last_row, last_col), (height, width) = np.array(self.shape) - 1, self.shape
         filled = [(row == 0, width), (row == last_row, width), (col == 0, height), (col == last_col, height)]

@@ -38,7 +38,8 @@ class SeenEdges:
     fold : (K,) int64
         Row in `folds` of each.
     folds : Folds
-    rays, facets : Rays, Facets
+    rays, facets, image : Rays, Facets, RangeImage
+        What they were found in.
     """
 
     points: np.ndarray
@@ -124,7 +125,7 @@ def see_edges(image: RangeImage, xyz: np.ndarray, kinds: EdgeKind) -> SeenEdges:
     """Find the edges of some kinds that a range image of points (N, 3) shows."""
     rays = without_stray(trace_rays(image, xyz))
     facets = fit_facets(rays)
-    wants_folds = EdgeKind.CREASE in kinds and (not facets.white or facets.noise_in(rays) > NOISY)
+    wants_folds = EdgeKind.CREASE in kinds and (not facets.white or facets.median_noise > NOISY)
     folds = find_folds(rays, facets) if wants_folds else no_folds()
     pixels, level, fold = _pixels_of(folds, facets, rays.near)
     creases = image.index.ravel()[pixels]

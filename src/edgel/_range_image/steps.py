@@ -7,7 +7,8 @@ import numpy as np
 from edgel._kernels.hysteresis import levels
 from edgel._kernels.parallel import kernel, part, run_slices
 from edgel._range_image.facet_fits import Facets
-from edgel._range_image.rays import APART, Rays
+from edgel._range_image.noise import even_places, spread
+from edgel._range_image.rays import Rays
 
 STEP = 2.0  # spacings: least break of the surface between two pixels
 GAP = 2.0  # spacings: least difference of their depths
@@ -24,7 +25,6 @@ BRIDGED = 5
 NEARBY = 2  # cells within which the window of a pixel's own side lies
 HELD = 0.25  # of the gap beside it, within which neighbours hold a pixel that no window fits
 _SPREAD = 0.7, 1.0364  # quantile of chance that tells its spread, and the normal distribution's: chance has long tails
-_SAMPLES = 1500  # places at which chance is looked at
 _BAND = 16  # rows
 
 
@@ -61,15 +61,12 @@ def find_steps(rays: Rays, facets: Facets, void: np.ndarray) -> tuple[np.ndarray
 
 def _chance(rays: Rays, facets: Facets) -> float:
     """Spread of the step between the planes of pixels 2 `SMEAR` + 1 apart over their noise, over the whole view."""
-    height, width = rays.near.shape
-    stride = max(int(np.sqrt(height * width / _SAMPLES)), 1)
-    places = np.array([(r, c) for r in range(stride // 2, height, stride) for c in range(stride // 2, width, stride)])
+    places = even_places(rays.near.shape)
     values = np.full((len(places), 2), np.nan, np.float32)
     run_slices(
         _sample, len(places), places, rays.near, rays.ray, facets.plane[0], facets.noise, facets.cell, values, size=128
     )
-    known = values[np.isfinite(values)]
-    return max(float(np.quantile(known, _SPREAD[0])) / _SPREAD[1], 1.0) if len(known) else 1.0
+    return spread(values, *_SPREAD)
 
 
 @kernel
@@ -226,8 +223,7 @@ def find_voids(rays: Rays) -> np.ndarray:
 
     Between lines that lie far apart nothing is wide: there only holes along the lines count, wider than is bridged.
     """
-    down, right = rays.pitch
-    size = (1, BRIDGED + 1) if down > APART * right else (BRIDGED + 1, 1) if right > APART * down else (BRIDGE + 1,) * 2
+    size = (1, BRIDGED + 1) if rays.apart[0] else (BRIDGED + 1, 1) if rays.apart[1] else (BRIDGE + 1,) * 2
     void = np.zeros(rays.near.shape, np.uint8)
     run_slices(_voids, len(void), rays.near, size, void, size=_BAND)
     return void

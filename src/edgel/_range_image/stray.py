@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from edgel._kernels.parallel import kernel, part, run_slices
-from edgel._range_image.rays import APART, Rays
+from edgel._range_image.rays import Rays
 
 CLOSE = 3.0  # spacings, and median differences of neighbours, within which a neighbour holds a pixel
 HELD = 2, 4  # of the 8 neighbours, or of the 24, that hold a pixel
@@ -25,8 +25,7 @@ def without_stray(rays: Rays) -> Rays:
     usual = float(np.median(step[known] / unit[known])) if known.any() else 0.0
     kept = np.empty_like(near)
     close = CLOSE * (1.0 + usual) * rays.side
-    down, right = rays.pitch
-    lines = (int(down < APART * right), int(right < APART * down))  # whether neighbours across them are any help
+    lines = (int(not rays.apart[0]), int(not rays.apart[1]))  # whether neighbours along columns and rows are any help
     held = HELD if all(lines) else ON_LINE
     run_slices(_without_stray, len(near), near, close, rays.central, held, lines, kept, size=_BAND)
     return replace(rays, near=kept)

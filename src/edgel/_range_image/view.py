@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from edgel._neighbors.kdtree import NeighborIndex, build_index
-from edgel._range_image.near_far import SHOWN, explaining_direction
+from edgel._range_image.near_far import DEPTH, SHOWN, explaining_direction
 from edgel._range_image.range_image import RangeImage, organized, orthographic, pinhole, spherical
 from edgel._range_image.regrid import camera_grid, map_grid, scanner_grid
 from edgel._range_image.rings import find_rings
@@ -16,7 +16,6 @@ from edgel.cloud import Cloud, Points
 
 METHODS = ("auto", "surface", "organized", "orthographic", "pinhole", "spherical")
 
-DEPTH = 3.0  # spacings behind the nearest point of its pixel within which a point still shows
 _SAMPLE = 50_000  # points at which directions are compared, where the best is asked for
 _FEW = 1_500  # and where only near and far sides are to be told apart
 _CAMERA = 0.5  # least cosine to the mean ray in the view of a camera
