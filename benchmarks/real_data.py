@@ -31,11 +31,11 @@ REMARKS = {
     "kinect_objects": "Depth quantised to steps of some millimetres: the default shows the outlines of the boxes and the "
     "folds of most; on bowls and bags some creases are false. The paper marks the "
     "outlines as wide bands and nothing inside.",
-    "kinect_organized": "As above. `organized_edge_1` is a rendered, noise-free frame: there the default finds the outlines and "
+    "kinect_organized": "As above, with short false steps on the table of `milk_cartoon`, and false creases on the wall behind the mug, whose "
+    "noise (a stereo camera's) is taken for independent. `organized_edge_1` is a rendered, noise-free frame: there the default finds the outlines and "
     "the folds. The paper finds the outlines only.",
     "lidar_sweeps": "The default knows the spinning sensor by its 32 rings and sees the sweep as it did: near and far sides "
-    "of depth steps, and the end of the ground about the car. Creases between rings are mostly false: a "
-    "ring's neighbours lie on the ring. For the paper every pixel beside a ring is an edge.",
+    "of depth steps, and the end of the ground about the car; few creases. For the paper every pixel beside a ring is an edge.",
     "roofs": "About a thousand points a roof. The default finds most of the eaves and parts of the ridges, with gaps. "
     "The paper's image is 8 pixels wide.",
     "scan_vs_mesh": "The scans (`.npy`) have noise of one spacing: what the default finds is scattered at random, the paper "
@@ -66,8 +66,8 @@ FRAME_REMARKS = {
     "false.",
     "phoxi": "Outlines and screw heads are clean, both sides of each step are there; the fold round the floor of the bin is soft and "
     "is not found. Where the sensor saw little, single missing points make boundaries of their neighbours.",
-    "vlp16": "Sixteen rings, drawn several pixels high. The board stands out by near and far sides; between rings creases are false "
-    "nearly everywhere something is cluttered, and along the whole first ring.",
+    "vlp16": "Sixteen rings, drawn several pixels high. The board stands out by near and far sides; hardly a crease is found or "
+    "missed between rings; missing shots make boundaries of their neighbours.",
     "ouster64": "Outlines of board, car and pillars are there, the folds of walls and floor in pieces; much clutter is called a crease.",
 }
 
