@@ -39,8 +39,8 @@ def detect(
         Points with a NaN or infinite coordinate are left out and counted.
     kinds : EdgeKind, or str, or iterable of str
         The kinds of edge wanted, as flags or as names ("boundary", "occluding", "occluded", "crease", "color",
-        "frame"); all but the last two unless told, and fewer cost less. A point of several kinds keeps the flags of
-        those wanted.
+        "frame"); all but the last two unless told; without creases a view takes less time. A point of several kinds
+        keeps the flags of those wanted.
     method : {"auto", "surface", "organized", "orthographic", "pinhole", "spherical"}
         The way to look at the cloud: on the surface itself, from any side; along the rows and columns of an organized
         cloud; or in a projection of that kind. "auto" chooses, and `Edges.method` and `Edges.reason` say what and why.

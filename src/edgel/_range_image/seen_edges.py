@@ -17,7 +17,6 @@ from edgel._range_image.stray import without_stray
 from edgel.edges import EdgeKind
 
 NOISY = 0.5  # spacings of independent noise from which windows in the image help neighbourhoods
-OUTLINE = EdgeKind.BOUNDARY | EdgeKind.OCCLUDING | EdgeKind.OCCLUDED
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,12 +130,10 @@ def see_edges(image: RangeImage, xyz: np.ndarray, kinds: EdgeKind) -> SeenEdges:
     creases = image.index.ravel()[pixels]
     ascending = np.argsort(creases)
     level = level[ascending]
-    if kinds & OUTLINE:
-        void = find_voids(rays)
-        rim = find_rims(rays.near, void)
-        step, side = find_steps(rays, facets, void)
-    else:
-        rim, step, side = np.zeros(image.shape, bool), np.zeros(image.shape), np.zeros(image.shape, np.uint8)
+    # Outlines are looked for whatever is wanted: a crease's strength is that of the most marked kind of its point.
+    void = find_voids(rays)
+    rim = find_rims(rays.near, void)
+    step, side = find_steps(rays, facets, void)
     # A rim is sure: a step there counts only where it is likely by itself.
     kind = np.where(step >= np.where(rim, 1.0, np.finfo(float).tiny), side, 0) | np.where(
         rim, int(EdgeKind.BOUNDARY), 0
