@@ -21,7 +21,7 @@ from pathlib import Path
 
 import lightgbm
 import numpy as np
-from examples import example
+from training_examples import example
 
 import edgel._surface
 from edgel import metrics
