@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from training_examples import example
 
 from edgel._neighbors.kdtree import build_index
 from edgel._surface import classify, cloud_statistics, screen
 from edgel._surface.features import LEAF, NUM_EVIDENCE, NUM_SCREEN, POINT
 from edgel._surface.forest import evaluate, load_forests
 from edgel._surface.training import add_context, screen_cloud, screening_features
-from examples import example
 
 
 @pytest.fixture(scope="module", params=[0, 1, 13])  # a whole surface, a view, a relief
