@@ -106,7 +106,7 @@ def detect(
             labels.add(np.arange(len(xyz)), EdgeKind.COLOR, strength_of_contrast(contrast))
     with stages("localisation"):
         kind = labels.of(kinds, min_strength)
-        edge = np.flatnonzero(kind)
+        edge = np.flatnonzero(kind > 0)
         faces = None if classified is None else surface.faces(edge, (kind[edge] & EdgeKind.CREASE) > 0, k, viewpoint)
         faces = faces if seen is None else seen.faces(edge, xyz, viewpoint, faces)
     return Edges(

@@ -15,6 +15,7 @@ from edgel._kernels.parallel import kernel, run_slices
 LARGEST = 1e30
 """Largest coordinate, in magnitude: squares of distances stay far from overflow and offsets fit single precision. In
 nanometres that is a hundred thousand light years."""
+_LARGE = 2  # state of a point with a larger one; 1 otherwise, 0 where it is not finite
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,17 +168,12 @@ def check_points(points: Any, *, minimum: int = 3) -> Points:
         If `points` carries no coordinates, or fewer than `minimum` finite ones, or one beyond `LARGEST`.
     """
     xyz = as_cloud(points).xyz
-    # The squares sum up to so little only if none is NaN, infinite or too large: one pass, no (N, 3) mask for the usual
-    # clean cloud.
-    with np.errstate(over="ignore", invalid="ignore"):
-        clean = bool(np.vdot(xyz, xyz) <= LARGEST**2)
-    if clean:
-        rows = np.arange(len(xyz))
-    else:
-        finite = np.empty(len(xyz), np.bool_)
-        run_slices(_finite, len(xyz), xyz, finite, size=65536)
-        rows = np.flatnonzero(finite)
-        xyz = xyz if len(rows) == len(xyz) else xyz.take(rows, axis=0)
+    # Kernels, not BLAS: its threads would spin for a while on the cores that ours need next.
+    state = np.empty(len(xyz), np.uint8)
+    run_slices(_look, len(xyz), xyz, state, size=65536)
+    rows = np.flatnonzero(state > 0)
+    xyz = xyz if len(rows) == len(xyz) else xyz.take(rows, axis=0)
+    if (state == _LARGE).any():
         _check_size(xyz, rows, "points")
     if len(rows) < minimum:
         found = (
@@ -188,9 +184,12 @@ def check_points(points: Any, *, minimum: int = 3) -> Points:
 
 
 @kernel
-def _finite(start, stop, xyz, finite):
+def _look(start, stop, xyz, state):
+    """Say of each point whether it is finite, and whether a coordinate is too large."""
     for p in range(start, stop):
-        finite[p] = math.isfinite(xyz[p, 0]) and math.isfinite(xyz[p, 1]) and math.isfinite(xyz[p, 2])
+        largest = max(abs(xyz[p, 0]), abs(xyz[p, 1]), abs(xyz[p, 2]))
+        finite = math.isfinite(xyz[p, 0]) and math.isfinite(xyz[p, 1]) and math.isfinite(xyz[p, 2])
+        state[p] = 0 if not finite else _LARGE if largest > LARGEST else 1
 
 
 def check_rows(at: Any, num_points: int) -> np.ndarray:

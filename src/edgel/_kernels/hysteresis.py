@@ -7,10 +7,8 @@ import numpy as np
 from edgel._kernels.parallel import kernel
 from edgel._kernels.union_find import find_root
 
-FAINTEST = 0.05  # of the level 1: what lies below is not looked at
 
-
-def levels(values: np.ndarray, weak: float, least: int) -> np.ndarray:
+def levels(values: np.ndarray, weak: float, least: int, faintest: float) -> tuple[np.ndarray, np.ndarray]:
     """Find the highest threshold at which hysteresis keeps each pixel.
 
     Hysteresis at a threshold t keeps a pixel above ``weak * t`` that 8-neighbours above it join to one of t or more,
@@ -19,26 +17,29 @@ def levels(values: np.ndarray, weak: float, least: int) -> np.ndarray:
 
     Parameters
     ----------
-    values : (H, W) float64
+    values : (H, W) float
     weak : float
         In (0, 1].
     least : int
+    faintest : float
+        What lies below is not looked at.
 
     Returns
     -------
-    (H, W) float64
-        0 where no threshold above `FAINTEST` keeps the pixel.
+    (K,) int64, (K,) float64
+        Places, ascending, in the flat image of the pixels that some threshold keeps, and the highest.
     """
     flat = values.ravel()
-    shown = np.flatnonzero(flat >= weak * FAINTEST)
-    order = shown[np.argsort(-flat[shown], kind="stable")]
+    shown = np.flatnonzero(flat >= faintest)
+    falling = np.argsort(-flat[shown], kind="stable")
+    order = shown[falling]
     rank = np.full(len(flat), -1, np.int32)
     rank[order] = np.arange(len(order))
     level = np.zeros(len(order))
-    _join(order, rank, flat[order], values.shape[1], weak, least, level)
-    found = np.zeros(len(flat))
-    found[order] = level
-    return found.reshape(values.shape)
+    _join(order, rank, flat[order].astype(np.float64), values.shape[1], weak, least, level)
+    found = np.empty(len(order))
+    found[falling] = level
+    return shown[found > 0], found[found > 0]
 
 
 @kernel

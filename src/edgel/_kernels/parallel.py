@@ -20,7 +20,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def _compiled(function: F, **options: Any) -> F:
-    compiled: Any = njit(nogil=True, **options)(function)
+    # Division by 0 gives infinity or NaN: a branch to an exception would keep every loop that divides off SIMD.
+    compiled: Any = njit(nogil=True, error_model="numpy", **options)(function)
     if compiled is not function:  # as it is under NUMBA_DISABLE_JIT
         compiled._cache = KernelCache(function)
     return compiled
@@ -97,8 +98,10 @@ def run_slices(compiled: Callable[..., Any], count: int, *arguments: Any, size: 
         for start in left:
             compiled(start, min(start + size, count), *arguments)
 
-    jobs = [_pool(threads).submit(work) for _ in range(threads)]
+    # The caller works, too: threads woken while it still holds its core would meet on another, and share it.
+    jobs = [_pool(threads - 1).submit(work) for _ in range(threads - 1)]
     try:
+        work()
         for job in jobs:
             job.result()
     except BaseException:  # Ctrl-C too: what has not begun need not run any more

@@ -29,9 +29,9 @@ class Facets:
 
     Attributes
     ----------
-    ray : (I, J, 4) float32
+    ray : (4, I, J) float32
         Mean ray of what is seen in each cell, and its mean `near`; 0 where nothing is.
-    plane : (S, I, J, 4) float32
+    plane : (S, 4, I, J) float32
         For each of `HALVES` the plane m, and the root mean square of what it leaves; infinite where too little is seen.
     noise : (I, J) float32
         Standard deviation of `near` around each cell, from the smallest windows.
@@ -39,6 +39,8 @@ class Facets:
         By how much more larger windows leave, in the median: low-frequency noise.
     cell : (int, int)
         Rows and columns of pixels of a cell.
+    cell_of : ((H,) int64, (W,) int64)
+        In which row of cells each row of pixels lies, and in which column: kernels look up what is slow to divide.
     stretch : float
         Height of a pixel over its width.
     median_noise : float
@@ -52,6 +54,7 @@ class Facets:
     noise: np.ndarray
     ratio: np.ndarray
     cell: tuple[int, int]
+    cell_of: tuple[np.ndarray, np.ndarray]
     stretch: float
     median_noise: float
     white: bool
@@ -63,21 +66,21 @@ def fit_facets(rays: Rays) -> Facets:
     # Lines of a spinning sensor lie farther apart than its shots: cells are as wide as they are high.
     cell = (CELL, CELL) if 0.67 < stretch < 1.5 else _stretched(stretch)
     shape = (-(-rays.near.shape[0] // cell[0]), -(-rays.near.shape[1] // cell[1]))
-    ray, plane = np.empty((*shape, 4), np.float32), np.empty((len(HALVES), *shape, 4), np.float32)
+    ray, plane = np.empty((4, *shape), np.float32), np.empty((len(HALVES), 4, *shape), np.float32)
     run_slices(_fit, shape[0], rays.ray, rays.near, cell, HALVES, FULL, ray, plane, size=_BAND)
-    noise = noise_level(plane[0, :, :, 3])
-    near, seen = ray[:, :, 3], np.asarray(ray.any(axis=2))
-    usual = float(np.median(near[seen])) if seen.any() else 1.0
-    noise = np.fmax(noise, FINEST * rays.spacing(np.where(seen, near, usual)))
+    seen = ray[3 if rays.central else 2] > 0
+    spacing = rays.spacing(np.where(seen, ray[3], np.nan))
+    noise = np.fmax(noise_level(plane[0, 3]), FINEST * spacing).astype(np.float32)
+    few = np.s_[::2, ::2]
+    shares = (noise[few] / spacing[few])[seen[few]]
+    median = float(np.median(shares)) if len(shares) else 0.0
     ratio = [1.0]
-    for s in range(1, len(HALVES)):
-        left = plane[s, ::2, ::2, 3]
-        ratios = left[np.isfinite(left)] / noise[::2, ::2][np.isfinite(left)]
-        ratio.append(max(float(np.median(ratios)), 1.0) if len(ratios) else 1.0)
-    noise = noise.astype(np.float32)
-    median = float(np.median(noise[seen] / rays.spacing(near[seen]))) if seen.any() else 0.0
-    white = is_white(rays, noise, cell, median=median, num_seen=int(seen.sum()))
-    return Facets(ray, plane, noise, np.array(ratio), cell, stretch, median, white)
+    for left in plane[1:, 3]:
+        shares = (left[few] / noise[few])[seen[few] & np.isfinite(left[few])]
+        ratio.append(max(float(np.median(shares)), 1.0) if len(shares) else 1.0)
+    white = is_white(rays, noise, cell, median=median, num_seen=int(np.count_nonzero(seen)))
+    cell_of = np.arange(rays.near.shape[0]) // cell[0], np.arange(rays.near.shape[1]) // cell[1]
+    return Facets(ray, plane, noise, np.array(ratio), cell, cell_of, stretch, median, white)
 
 
 def _stretched(stretch: float) -> tuple[int, int]:
@@ -88,7 +91,7 @@ def _stretched(stretch: float) -> tuple[int, int]:
 def _fit(start, stop, rays, near, cell, halves, full, ray, plane):
     """Fit the windows around some rows of cells, from a table of sums of these rows and those within reach."""
     reach = halves.max()
-    rows, cols = ray.shape[0], ray.shape[1]
+    rows, cols = ray.shape[1], ray.shape[2]
     first, last = max(start - reach, 0), min(stop + reach, rows)
     # Columns on either side repeat the table's rim, so that no window has to be cut off.
     table = np.zeros((_SUMS, last - first + 1, cols + 1 + 2 * reach))
@@ -105,16 +108,16 @@ def _fit(start, stop, rays, near, cell, halves, full, ray, plane):
                     a, b = j + reach - half, j + reach + half + 1
                     box[k, j] = table[k, bottom, b] - table[k, top, b] - table[k, bottom, a] + table[k, top, a]
             _regress(box, least, fitted)
-            for j in range(cols):
-                for k in range(4):
-                    plane[s, i, j, k] = fitted[k, j]
+            for k in range(4):
+                for j in range(cols):
+                    plane[s, k, i, j] = fitted[k, j]
 
 
 @kernel
 def _sum_row(i, rays, near, cell, ray, own, table, row, reach):
     """Add a row of cells to the table; where it is the caller's own, note the mean rays."""
     height, width = near.shape
-    cols = ray.shape[1]
+    cols = ray.shape[2]
     s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = s8 = s9 = s10 = 0.0
     for j in range(cols):
         sx = sy = sz = sd = 0.0
@@ -143,7 +146,7 @@ def _sum_row(i, rays, near, cell, ray, own, table, row, reach):
         s10 += n
         if own:
             scale = 1.0 / n if n > 0 else 0.0
-            ray[i, j, 0], ray[i, j, 1], ray[i, j, 2], ray[i, j, 3] = sx * scale, sy * scale, sz * scale, sd * scale
+            ray[0, i, j], ray[1, i, j], ray[2, i, j], ray[3, i, j] = sx * scale, sy * scale, sz * scale, sd * scale
         at = j + reach + 1
         table[0, row, at] = table[0, row - 1, at] + s0
         table[1, row, at] = table[1, row - 1, at] + s1

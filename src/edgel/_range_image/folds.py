@@ -32,7 +32,7 @@ PARABOLA = 0.3, 0.7  # pixels, and shares of what a parabola does, by which a fo
 DIRECTIONS = np.array([(0, 1), (1, 2), (1, 1), (2, 1), (1, 0), (2, -1), (1, -1), (1, -2)], float)
 DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1)[:, None]
 _SPREAD = 0.25, 0.3186  # quantile of chance that tells its spread, and the normal distribution's: true folds are above
-_BAND = 8  # rows of cells
+_BAND, _BLOCK = 8, 32  # rows of cells, and cells of a row that are compared in one go (more, and LLVM unrolls no loop)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,22 +83,22 @@ def find_folds(rays: Rays, facets: Facets) -> Folds:
         _score, shape[0], facets.ray, facets.plane, facets.noise, facets.ratio, shifts, lengths, chance * SURE,
         widths, rays.central, score, best, offset, size=_BAND,
     )  # fmt: skip
-    kept = np.zeros(shape)
+    kept = np.zeros(shape, np.float32)
     run_slices(
         _thin, shape[0], score, best, offset, shifts, lengths, widths, facets.ray, facets.plane, rays.ray,
         rays.near, facets.cell, kept, size=_BAND,
     )  # fmt: skip
-    level = levels(kept, WEAK, CHAIN)
-    row, col = np.nonzero(level)
+    places, level = levels(kept, WEAK, CHAIN, WEAK * FAINTEST)
+    row, col = np.divmod(places, shape[1])
     chosen = best[row, col]
     size, way = np.divmod(chosen, len(DIRECTIONS))
     down, right = shifts[size, way].T
     step = shifts[size, way] * facets.cell * (facets.stretch, 1.0)
     one, other = (size, row + down, col + right), (size, row - down, col - right)
-    first, second = facets.plane[one][:, :3], facets.plane[other][:, :3]
-    between = facets.ray[one[1:]][:, :3] - facets.ray[other[1:]][:, :3]
+    first, second = (facets.plane[at[0], :3, at[1], at[2]] for at in (one, other))
+    between = (facets.ray[:3, row + down, col + right] - facets.ray[:3, row - down, col - right]).T
     return Folds(
-        level[row, col],
+        level,
         np.column_stack([row, col]),
         first,
         second,
@@ -127,74 +127,116 @@ def _chance(facets: Facets, shifts: np.ndarray, lengths: np.ndarray, widths: np.
     return np.array([spread(values[:, s], *_SPREAD) for s in range(len(HALVES))])
 
 
-@part
-def _compare(i, j, down, right, length, ray, plane, noise):
-    """Difference of slopes per pixel and of values in the middle, and the noise: infinite where none is known."""
-    rows, cols = ray.shape[0], ray.shape[1]
-    a, b, c, d = i + down, j + right, i - down, j - right
-    if min(a, c) < 0 or max(a, c) >= rows or min(b, d) < 0 or max(b, d) >= cols:
-        return 0.0, 0.0, np.inf
-    left = max(plane[a, b, 3], plane[c, d, 3])
-    if not left < MISFIT * noise:
-        return 0.0, 0.0, np.inf
-    turn = gap = 0.0
-    for k in range(3):
-        differs = plane[a, b, k] - plane[c, d, k]
-        turn += differs * (ray[a, b, k] - ray[c, d, k])
-        gap += differs * ray[i, j, k]
-    return turn / (2 * length), gap, max(left, noise)
-
-
 @kernel
 def _sample(start, stop, places, ray, plane, noise, ratio, shifts, lengths, widths, values):
+    rows, cols = noise.shape
     for p in range(start, stop):
         i, j = places[p]
-        if ray[i, j, 0] == 0 and ray[i, j, 1] == 0 and ray[i, j, 2] == 0:
+        if ray[0, i, j] == 0 and ray[1, i, j] == 0 and ray[2, i, j] == 0:
             continue
         for s in range(len(widths)):
             nominal = np.sqrt(24.0) / (widths[s] * widths[s])
             for k in range(shifts.shape[1]):
-                turn, _, left = _compare(
-                    i, j, shifts[s, k, 0], shifts[s, k, 1], lengths[s, k], ray, plane[s], noise[i, j] * ratio[s]
-                )
-                if left < np.inf:
-                    values[p, s, k] = abs(turn) / (left * nominal)
+                a, b, c, d = i + shifts[s, k, 0], j + shifts[s, k, 1], i - shifts[s, k, 0], j - shifts[s, k, 1]
+                if min(a, c) < 0 or max(a, c) >= rows or min(b, d) < 0 or max(b, d) >= cols:
+                    continue
+                left = max(plane[s, 3, a, b], plane[s, 3, c, d])
+                if left < MISFIT * noise[i, j] * ratio[s]:
+                    turn = 0.0
+                    for m in range(3):
+                        turn += (plane[s, m, a, b] - plane[s, m, c, d]) * (ray[m, a, b] - ray[m, c, d])
+                    left = max(left, noise[i, j] * ratio[s])
+                    values[p, s, k] = abs(turn) / (2 * lengths[s, k] * left * nominal)
 
 
 @kernel
 def _score(start, stop, ray, plane, noise, ratio, shifts, lengths, sure, widths, central, score, best, offset):
-    cols = noise.shape[1]
-    cosine = np.cos(MIN_TURN)
+    """Compare the windows of every size and direction around each cell that no single plane explains.
+
+    In blocks, copied side by side: loops over them, of a length known when they are compiled, run on SIMD.
+    """
+    rows, cols = noise.shape
     ways = shifts.shape[1]
+    block, found = np.empty((18, _BLOCK), np.float32), np.empty((4, _BLOCK), np.float32)
     for i in range(start, stop):
-        for j in range(cols):
-            if ray[i, j, 0] == 0 and ray[i, j, 1] == 0 and ray[i, j, 2] == 0:
-                continue
-            explained = True
-            for s in range(len(widths)):
-                explained = explained and plane[s, i, j, 3] < EXPLAINED[s] * ratio[s] * noise[i, j]
-            if explained:
+        for at in range(0, cols, _BLOCK):
+            if not _begin(i, at, ray, plane, noise, ratio, block, found):
                 continue
             for s in range(len(widths)):
-                nominal = np.sqrt(24.0) / (widths[s] * widths[s]) * sure[s]
-                # Every other direction first, then those beside the best of them, or all where none could be compared.
-                steepest, middle = 0.0, -1
-                for n in range(ways):
-                    k = 2 * n if n < ways // 2 else 2 * n - ways + 1
-                    if n >= ways // 2 and middle >= 0 and k != (middle + 1) % ways and k != (middle + ways - 1) % ways:
-                        continue
+                for k in range(ways):
                     down, right = shifts[s, k, 0], shifts[s, k, 1]
-                    turn, gap, left = _compare(i, j, down, right, lengths[s, k], ray, plane[s], noise[i, j] * ratio[s])
-                    value = abs(turn) / (left * nominal)
-                    if n < ways // 2 and value > steepest:
-                        steepest, middle = value, k
-                    if value < FAINTEST or not value > score[i, j]:
+                    low, high = max(abs(right) - at, 0), min(cols - abs(right) - at, _BLOCK)
+                    if abs(down) > min(i, rows - 1 - i) or low >= high:
                         continue
-                    if abs(gap) > (BESIDE[0] + BESIDE[1] * widths[s] / 2) * abs(turn):
-                        continue
-                    if _cosine(plane[s, i + down, j + right], plane[s, i - down, j - right], central) > cosine:
-                        continue
-                    score[i, j], best[i, j], offset[i, j] = value, s * ways + k, -gap / turn
+                    _take(block, 0, i + down, at + low + right, low, high, plane[s], ray)
+                    _take(block, 7, i - down, at + low - right, low, high, plane[s], ray)
+                    length = 2 * lengths[s, k]
+                    nominal = np.sqrt(24.0) / (widths[s] * widths[s]) * sure[s] * length
+                    reach = (BESIDE[0] + BESIDE[1] * widths[s] / 2) / length
+                    _compare(block, ratio[s], nominal, reach, s * ways + k, found)
+            for j in range(min(_BLOCK, cols - at)):
+                if found[3, j] < 0:
+                    continue
+                s, k = int(found[3, j]) // ways, int(found[3, j]) % ways
+                down, right = shifts[s, k, 0], shifts[s, k, 1]
+                one, two = plane[s, :, i + down, at + j + right], plane[s, :, i - down, at + j - right]
+                if _cosine(one, two, central) <= np.cos(MIN_TURN):
+                    score[i, at + j], best[i, at + j] = abs(found[0, j]) / found[1, j], s * ways + k
+                    offset[i, at + j] = -found[2, j] / found[0, j] * 2 * lengths[s, k]
+
+
+@part
+def _begin(i, at, ray, plane, noise, ratio, block, found):
+    """Note the rays and the noise of a block of cells, 0 where one plane explains the place; False where all are."""
+    some = False
+    block[:] = 0.0
+    found[0], found[1], found[2], found[3] = FAINTEST, 1.0, 0.0, -1.0
+    for j in range(min(_BLOCK, noise.shape[1] - at)):
+        col = at + j
+        if ray[0, i, col] == 0 and ray[1, i, col] == 0 and ray[2, i, col] == 0:
+            continue
+        explained = True
+        for s in range(len(ratio)):
+            explained = explained and plane[s, 3, i, col] < EXPLAINED[s] * ratio[s] * noise[i, col]
+        if not explained:
+            block[14, j], block[15, j], block[16, j] = ray[0, i, col], ray[1, i, col], ray[2, i, col]
+            block[17, j] = noise[i, col]
+            some = True
+    return some
+
+
+@part
+def _take(block, to, row, col, low, high, plane, ray):
+    """Copy the planes of windows, what they leave, and their rays; those beyond the image leave too much."""
+    # Unsigned: Numba lets signed numbers count from the end, which keeps a loop off SIMD.
+    row, col, first, count = np.uint64(row), np.uint64(col), np.uint64(low), np.uint64(high - low)
+    for j in range(_BLOCK):
+        block[to + 3, j] = np.inf
+    for m in range(4):
+        for j in range(count):
+            block[to + m, first + j] = plane[m, row, col + j]
+    for m in range(3):
+        for j in range(count):
+            block[to + 4 + m, first + j] = ray[m, row, col + j]
+
+
+@part
+def _compare(block, ratio, nominal, reach, tag, found):
+    """Keep a pair of windows where its slopes differ more, over chance, and its planes meet near the middle."""
+    ratio, nominal, reach, tag = np.float32(ratio), np.float32(nominal), np.float32(reach), np.float32(tag)
+    for j in range(_BLOCK):
+        x, y, z = block[0, j] - block[7, j], block[1, j] - block[8, j], block[2, j] - block[9, j]
+        turn = x * (block[4, j] - block[11, j]) + y * (block[5, j] - block[12, j]) + z * (block[6, j] - block[13, j])
+        gap = x * block[14, j] + y * block[15, j] + z * block[16, j]
+        sigma = block[17, j] * ratio
+        left = max(block[3, j], block[10, j])
+        chance = max(left, sigma) * nominal
+        better = (left < np.float32(MISFIT) * sigma) & (abs(gap) <= reach * abs(turn))
+        better = better & (abs(turn) * found[1, j] > abs(found[0, j]) * chance)
+        found[0, j] = turn if better else found[0, j]
+        found[1, j] = chance if better else found[1, j]
+        found[2, j] = gap if better else found[2, j]
+        found[3, j] = tag if better else found[3, j]
 
 
 @part
@@ -235,7 +277,7 @@ def _thin(start, stop, score, best, offset, shifts, lengths, widths, ray, plane,
             if not largest:
                 continue
             down, right = shifts[s, k, 0], shifts[s, k, 1]
-            first, second = plane[s, i + down, j + right], plane[s, i - down, j - right]
+            first, second = plane[s, :, i + down, j + right], plane[s, :, i - down, j - right]
             # The place where the line runs, and how far the surface leaves the mean of both planes there.
             length = lengths[s, k]
             row = int(i * cell[0] + (cell[0] - 1) / 2 + offset[i, j] * down * cell[0] / length + 0.5)
@@ -250,7 +292,7 @@ def _thin(start, stop, score, best, offset, shifts, lengths, widths, ray, plane,
                         count += 1
             turn = 0.0
             for m in range(3):
-                turn += (first[m] - second[m]) * (ray[i + down, j + right, m] - ray[i - down, j - right, m])
+                turn += (first[m] - second[m]) * (ray[m, i + down, j + right] - ray[m, i - down, j - right])
             if count == 0 or turn == 0.0:
                 continue
             leaves = abs(total / count / turn) * 2 * length

@@ -22,7 +22,7 @@ _SAMPLE = 2000  # points at which the evenness of the image is looked at
 _RINGS = 0.25  # nearest neighbours this much flatter than 45 degrees lie on scan lines along the rows
 _GRID, _EVEN = 0.9, 0.75  # nearest neighbours of a grid are 1 spacing away, those of random points 0.5
 _LOOSE = 1.3  # pixels of random points are this much larger than their spacing, or a third would be empty
-_PAIRS = 5_000  # neighbours along a column, and along a row, at which an organized cloud is looked at
+_PAIRS = 2_000  # neighbours along a column, and along a row, at which an organized cloud is looked at
 _GRAZING = 1e-6  # cosine to the optical axis from which a point lies beside the camera
 _MOST_PIXELS = 50  # for each point
 
@@ -96,24 +96,25 @@ def organized(
         steps, eye, middle = across, None, direction
     else:
         steps = from_eye
-    depth = np.full(len(xyz), np.nan)
-    run_slices(_depths, len(xyz), xyz, np.zeros(3) if eye is None else eye, eye is not None, middle, depth)
-    # What lies in the viewpoint itself does not show: sensors report shots without an echo so.
-    index.ravel()[rows[np.isnan(depth)]] = -1
     image = np.full(shape, np.nan)
-    image.ravel()[rows] = depth
+    run_slices(
+        _show, len(xyz), xyz, rows, np.zeros(3) if eye is None else eye, eye is not None, middle, image.ravel(),
+        index.ravel(), size=65536,
+    )  # fmt: skip
     pitch = [pitch_of(step) for step in steps]
     return RangeImage(image, index, "organized", (pitch[0], pitch[1]), eye, middle, np.zeros(len(xyz)))
 
 
 @kernel
-def _depths(start, stop, xyz, eye, central, direction, depth):
+def _show(start, stop, xyz, rows, eye, central, direction, depth, index):
     for p in range(start, stop):
         x, y, z = xyz[p, 0] - eye[0], xyz[p, 1] - eye[1], xyz[p, 2] - eye[2]
         if not central:
-            depth[p] = x * direction[0] + y * direction[1] + z * direction[2]
+            depth[rows[p]] = x * direction[0] + y * direction[1] + z * direction[2]
         elif x != 0 or y != 0 or z != 0:
-            depth[p] = np.sqrt(x * x + y * y + z * z)
+            depth[rows[p]] = np.sqrt(x * x + y * y + z * z)
+        else:  # in the viewpoint itself: sensors report shots without an echo so
+            index[rows[p]] = -1
 
 
 def _across(steps: np.ndarray, direction: np.ndarray) -> np.ndarray:

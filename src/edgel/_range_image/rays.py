@@ -16,7 +16,7 @@ from edgel._range_image.range_image import RangeImage
 
 APART = 1.7  # times the pitch along lines, from which lines (of a spinning sensor) lie far apart
 _NEAREST = 1e-60  # squared distance
-_BAND = 16  # rows
+_BAND = 64  # rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,11 +91,11 @@ def trace_rays(image: RangeImage, xyz: np.ndarray) -> Rays:
     """
     ray, near = np.empty((*image.shape, 3), np.float32), np.empty(image.shape, np.float32)
     central = image.viewpoint is not None
-    # Of parallel rays: the middle of the box, since a mean would depend on the order of the points in its last digit.
-    axes, origin = np.eye(3), (xyz.min(axis=0) + xyz.max(axis=0)) / 2 if len(xyz) else np.zeros(3)
     if image.viewpoint is not None:
-        origin = image.viewpoint
+        axes, origin = np.eye(3), image.viewpoint
     else:
+        # The middle of the box, since a mean would depend on the order of the points in its last digit.
+        origin = np.array([(each.min() + each.max()) / 2 if len(xyz) else 0.0 for each in xyz.T])
         forward = image.direction
         right = np.cross(forward, np.eye(3)[np.argmin(np.abs(forward))])
         right /= np.linalg.norm(right)

@@ -110,12 +110,13 @@ class SeenEdges:
 
     def _own_normals(self, edge: np.ndarray, viewpoint: np.ndarray | None, xyz: np.ndarray) -> np.ndarray:
         """Normals (E, 3) of the surface on the points' own side of whatever edge is near; NaN where none fits."""
-        pixel = np.full(len(xyz), -1, np.int64)
-        shown = np.flatnonzero(self.image.index.ravel() >= 0)
-        pixel[self.image.index.ravel()[shown]] = shown
+        place = np.full(len(xyz), -1, np.int32)
+        place[edge] = np.arange(len(edge))
         planes = np.full((len(edge), 3), np.nan)
-        rays, facets = self.rays, self.facets
-        run_slices(_own_planes, len(edge), pixel[edge], rays.near, rays.ray, facets.plane[0], facets.cell, planes)
+        rays, facets, index = self.rays, self.facets, self.image.index
+        run_slices(
+            _own_planes, len(index), index, place, rays.near, rays.ray, facets.plane[0], facets.cell_of, planes, size=64
+        )
         normals, _ = rays.planes(planes)
         return np.where(inside_of(normals, xyz[edge], viewpoint)[:, None], -normals, normals)
 
@@ -134,21 +135,18 @@ def see_edges(image: RangeImage, xyz: np.ndarray, kinds: EdgeKind) -> SeenEdges:
     void = find_voids(rays)
     rim = find_rims(rays.near, void)
     step, side = find_steps(rays, facets, void)
-    # A rim is sure: a step there counts only where it is likely by itself.
-    kind = np.where(step >= np.where(rim, 1.0, np.finfo(float).tiny), side, 0) | np.where(
-        rim, int(EdgeKind.BOUNDARY), 0
-    )
     frame = np.zeros(image.shape, bool)
     if EdgeKind.FRAME in kinds and image.method == "organized":
         frame[[0, -1]], frame[:, [0, -1]] = True, True
         frame &= image.index >= 0
-        kind |= np.where(frame, int(EdgeKind.FRAME), 0)
-    outline = np.flatnonzero(kind)
-    strength = np.where((rim | frame).ravel()[outline], 1.0, step.ravel()[outline] / (1 + step.ravel()[outline]))
+    outline = np.flatnonzero((step > 0) | rim | frame)
+    step, side, rim, frame = (each.ravel()[outline] for each in (step, side, rim, frame))
+    # A rim is sure: a step there counts only where it is likely by itself.
+    kind = np.where((step >= 1) | ~rim, side, 0) | (rim * int(EdgeKind.BOUNDARY)) | (frame * int(EdgeKind.FRAME))
     return SeenEdges(
         image.index.ravel()[outline],
-        kind.ravel()[outline].astype(np.uint8),
-        strength,
+        kind.astype(np.uint8),
+        np.where(rim | frame, 1.0, step / (1 + step)),
         creases[ascending],
         level / (1 + level),
         fold[ascending],
@@ -181,13 +179,13 @@ def _pixels_of(folds: Folds, facets: Facets, near: np.ndarray) -> tuple[np.ndarr
 
 
 @kernel
-def _own_planes(start, stop, pixels, near, ray, plane, cell, planes):
-    width = near.shape[1]
-    for p in range(start, stop):
-        if pixels[p] < 0:
-            continue
-        row, col = pixels[p] // width, pixels[p] % width
-        i, j, misfit = own_plane(row, col, near, ray, plane, cell)
-        if misfit < np.inf:
-            for k in range(3):
-                planes[p, k] = plane[i, j, k]
+def _own_planes(start, stop, index, place, near, ray, plane, cell_of, planes):
+    for row in range(start, stop):
+        for col in range(index.shape[1]):
+            at = place[index[row, col]] if index[row, col] >= 0 else -1
+            if at < 0:
+                continue
+            i, j, misfit = own_plane(row, col, near, ray, plane, cell_of)
+            if misfit < np.inf:
+                for k in range(3):
+                    planes[at, k] = plane[k, i, j]

@@ -26,6 +26,7 @@ NEARBY = 2  # cells within which the window of a pixel's own side lies
 HELD = 0.25  # of the gap beside it, within which neighbours hold a pixel that no window fits
 _SPREAD = 0.7, 1.0364  # quantile of chance that tells its spread, and the normal distribution's: chance has long tails
 _BAND = 16  # rows
+_UNKNOWN, _NONE = -2, -1  # for the cell of a pixel's own plane
 
 
 def find_steps(rays: Rays, facets: Facets, void: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -47,16 +48,18 @@ def find_steps(rays: Rays, facets: Facets, void: np.ndarray) -> tuple[np.ndarray
     # Where neighbours share no noise no sensor has smeared the steps, and chance is what it should be.
     smear, sure = (0, SURE) if facets.white else (SMEAR, SURE * _chance(rays, facets))
     bridged = [int(BRIDGED * min(rays.pitch) / rays.pitch[1 - way] + 0.5) for way in (0, 1)]
+    own, misfit = np.full(shape, _UNKNOWN, np.int32), np.empty(shape, np.float32)
     for way in (0, 1):  # a pixel belongs to pairs of two rows: bands of the second way are columns
         run_slices(
-            _steps, shape[way], way, rays.near, rays.ray, facets.plane[0], facets.noise, facets.cell,
-            max(rays.side, rays.pitch[1 - way]), rays.central, sure, void, bridged[way], smear, step, side,
+            _steps, shape[way], way, rays.near, rays.ray, facets.plane[0], facets.noise, facets.cell_of,
+            facets.cell[1], max(rays.side, rays.pitch[1 - way]), rays.central, sure, void, bridged[way], smear, own, misfit, step, side,
             size=(1 + 3 * way) * _BAND,
         )  # fmt: skip
-    step = np.where(step < FAINTEST, 0.0, step.astype(np.float64))
-    level = levels(step, WEAK, CHAIN)
-    sheer = levels(np.where(step < WEAK * SHEER[0] * FAINTEST, 0.0, step / SHEER[0]), WEAK, SHEER[1])
-    return np.fmax(level, sheer), side
+    level = np.zeros(step.size)
+    for scale, chain, faintest in ((1.0, CHAIN, FAINTEST), (SHEER[0], SHEER[1], WEAK * SHEER[0] * FAINTEST)):
+        places, found = levels(step, WEAK, chain, faintest)
+        level[places] = np.fmax(level[places], found / scale)
+    return level.reshape(shape), side
 
 
 def _chance(rays: Rays, facets: Facets) -> float:
@@ -64,13 +67,22 @@ def _chance(rays: Rays, facets: Facets) -> float:
     places = even_places(rays.near.shape)
     values = np.full((len(places), 2), np.nan, np.float32)
     run_slices(
-        _sample, len(places), places, rays.near, rays.ray, facets.plane[0], facets.noise, facets.cell, values, size=128
+        _sample,
+        len(places),
+        places,
+        rays.near,
+        rays.ray,
+        facets.plane[0],
+        facets.noise,
+        facets.cell_of,
+        values,
+        size=128,
     )
     return spread(values, *_SPREAD)
 
 
 @kernel
-def _sample(start, stop, places, near, ray, plane, noise, cell, values):
+def _sample(start, stop, places, near, ray, plane, noise, cell_of, values):
     height, width = near.shape
     for n in range(start, stop):
         row, col = places[n]
@@ -80,37 +92,47 @@ def _sample(start, stop, places, near, ray, plane, noise, cell, values):
             r, c = (row, col + 2 * SMEAR + 1) if way == 0 else (row + 2 * SMEAR + 1, col)
             if r >= height or c >= width or near[r, c] != near[r, c]:
                 continue
-            i, j, _ = own_plane(row, col, near, ray, plane, cell)
-            a, b, _ = own_plane(r, c, near, ray, plane, cell)
+            i, j, _ = own_plane(row, col, near, ray, plane, cell_of)
+            a, b, _ = own_plane(r, c, near, ray, plane, cell_of)
             if i < 0 or a < 0:
                 continue
             step = 0.0
             for k in range(3):
-                step += (plane[a, b, k] - plane[i, j, k]) * ray[row, col, k]
-            left = max(plane[i, j, 3], plane[a, b, 3], noise[row // cell[0], col // cell[1]])
+                step += (plane[k, a, b] - plane[k, i, j]) * ray[row, col, k]
+            left = max(plane[3, i, j], plane[3, a, b], noise[cell_of[0][row], cell_of[1][col]])
             if left > 0.0:
                 values[n, way] = abs(step) / left
 
 
 @part
-def own_plane(row, col, near, ray, plane, cell):
+def own_plane(row, col, near, ray, plane, cell_of):
     """Cell of the window that fits a pixel's own side best, and the plane's misfit there and in all, squared."""
-    i, j = row // cell[0], col // cell[1]
-    best, where_i, where_j = np.inf, -1, -1
-    for a in range(max(i - NEARBY, 0), min(i + NEARBY + 1, plane.shape[0])):
-        for b in range(max(j - NEARBY, 0), min(j + NEARBY + 1, plane.shape[1])):
-            left = plane[a, b, 3]
-            if left == np.inf:
-                continue
-            off = near[row, col]
-            for k in range(3):
-                off -= plane[a, b, k] * ray[row, col, k]
-            apart = (a - i) * (a - i) + (b - j) * (b - j)
+    i, j = cell_of[0][row], cell_of[1][col]
+    best, where = np.float32(np.inf), -1
+    x, y, z, own = ray[row, col, 0], ray[row, col, 1], ray[row, col, 2], near[row, col]
+    for down in range(-NEARBY, NEARBY + 1):
+        for right in range(-NEARBY, NEARBY + 1):
+            # At the rim a window comes up more than once: as the nearest it is, it wins.
+            a, b = min(max(i + down, 0), plane.shape[1] - 1), min(max(j + right, 0), plane.shape[2] - 1)
+            left = plane[3, a, b]
+            off = own - plane[0, a, b] * x - plane[1, a, b] * y - plane[2, a, b] * z
             # The farther the window, the farther its plane is extended.
-            value = left * left * (1.0 + 0.1 * apart) + off * off / 4
-            if value < best:
-                best, where_i, where_j = value, a, b
-    return where_i, where_j, best
+            farther = np.float32(1.0 + 0.1 * (down * down + right * right))
+            value = left * left * farther + np.float32(0.25) * off * off
+            better = value < best
+            best, where = (value, a * plane.shape[2] + b) if better else (best, where)
+    return where // plane.shape[2] if where >= 0 else -1, where % plane.shape[2], best
+
+
+@part
+def _own(row, col, near, ray, plane, cell_of, own, misfit):
+    """Cell of a pixel's own plane, found when it is first asked for; negative where there is none."""
+    at = own[row, col]
+    if at == _UNKNOWN:
+        i, j, left = own_plane(row, col, near, ray, plane, cell_of)
+        at = i * plane.shape[2] + j if i >= 0 else _NONE
+        own[row, col], misfit[row, col] = at, left
+    return at
 
 
 @part
@@ -125,27 +147,29 @@ def _held(row, col, gap, near):
 
 
 @part
-def _leap(row, col, r, c, dr, dc, near, ray, plane, noise, cell):
+def _leap(row, col, r, c, dr, dc, near, ray, plane, noise, cell_of, own, misfit):
     """Step that neither side's slope explains, and its noise."""
     height, width = near.shape
     gap = near[r, c] - near[row, col]
-    sigma = noise[row // cell[0], col // cell[1]]
-    i, j, misfit = own_plane(row, col, near, ray, plane, cell)
-    a, b, other = own_plane(r, c, near, ray, plane, cell)
+    sigma = noise[cell_of[0][row], cell_of[1][col]]
+    one = _own(row, col, near, ray, plane, cell_of, own, misfit)
+    two = _own(r, c, near, ray, plane, cell_of, own, misfit)
     limit = 16 * sigma * sigma
-    if i >= 0 and a >= 0 and misfit < limit and other < limit:
+    fits, other = misfit[row, col] < limit, misfit[r, c] < limit
+    if one >= 0 and two >= 0 and fits and other:
+        i, j, a, b = one // plane.shape[2], one % plane.shape[2], two // plane.shape[2], two % plane.shape[2]
         here = there = 0.0
         for k in range(3):
-            differs = plane[a, b, k] - plane[i, j, k]
+            differs = plane[k, a, b] - plane[k, i, j]
             here += differs * ray[row, col, k]
             there += differs * ray[r, c, k]
         # Seen from either pixel: planes that merely cross between the two, at a fold, are no step.
         if here * gap <= 0 or there * gap <= 0:
             return 0.0, 1.0
-        left = max(plane[i, j, 3], plane[a, b, 3], sigma)
+        left = max(plane[3, i, j], plane[3, a, b], sigma)
         return min(abs(here), abs(there)), left
     # Too thin for a window: neighbours have to hold it, and the pixels behind tell the slope.
-    if (not misfit < limit and not _held(row, col, gap, near)) or (not other < limit and not _held(r, c, gap, near)):
+    if (not fits and not _held(row, col, gap, near)) or (not other and not _held(r, c, gap, near)):
         return 0.0, sigma
     leap = abs(gap)
     for s in range(2):
@@ -159,44 +183,48 @@ def _leap(row, col, r, c, dr, dc, near, ray, plane, noise, cell):
 
 
 @kernel
-def _steps(start, stop, way, near, ray, plane, noise, cell, unit, central, sure, void, bridged, smear, step, side):
+def _steps(
+    start, stop, way, near, ray, plane, noise, cell_of, wide, unit, central, sure, void, bridged, smear, own, misfit,
+    step, side
+):  # fmt: skip
     height, width = near.shape
     dr, dc = (0, 1) if way == 0 else (1, 0)
     rows = (start, stop) if way == 0 else (0, height)
     cols = (0, width) if way == 0 else (start, stop)
     for row in range(rows[0], rows[1]):
-        for col in range(cols[0], cols[1]):
-            own = near[row, col]
-            if own != own:
-                continue
-            i, j = row // cell[0], col // cell[1]
+        i = cell_of[0][row]
+        for j in range(cell_of[1][cols[0]], cell_of[1][cols[1] - 1] + 1):
             # The window around a pixel beside a step lies on both sides of it: where one plane explains it, none is.
-            if plane[i, j, 3] < EXPLAINED * noise[i, j]:
+            if plane[3, i, j] < EXPLAINED * noise[i, j]:
                 continue
-            r, c = row + dr, col + dc
-            for _ in range(bridged):
-                if r < height and c < width and near[r, c] != near[r, c] and not void[r, c]:
-                    r, c = r + dr, c + dc
-            if r >= height or c >= width or near[r, c] != near[r, c]:
-                continue
-            gap = near[r, c] - own
-            spacing = unit * max(own, near[r, c]) if central else unit
-            if not abs(gap) > LEAST * spacing or not _steepest(row, col, r, c, dr, dc, gap, near, smear):
-                continue
-            sigma, value = noise[i, j], 0.0
-            for apart in range(min(smear, bridged) + 1):
-                p, q, u, v = row - apart * dr, col - apart * dc, r + apart * dr, c + apart * dc
-                if p < 0 or q < 0 or u >= height or v >= width:
-                    break
-                whole = (near[u, v] - near[p, q]) * (1.0 if gap > 0 else -1.0)
-                if not whole > max(GAP * spacing, sure * sigma / 2):  # NaN too
+            for col in range(max(j * wide, cols[0]), min((j + 1) * wide, cols[1])):
+                here = near[row, col]
+                if here != here:
                     continue
-                leap, left = _leap(p, q, u, v, dr, dc, near, ray, plane, noise, cell)
-                value = max(value, min(leap / max(STEP * spacing, sure * left), whole / (GAP * spacing)))
-            if value > step[row, col]:
-                step[row, col], side[row, col] = value, 4 if gap > 0 else 2
-            if value > step[r, c]:
-                step[r, c], side[r, c] = value, 2 if gap > 0 else 4
+                r, c = row + dr, col + dc
+                left_over = bridged
+                while left_over and r < height and c < width and near[r, c] != near[r, c] and not void[r, c]:
+                    r, c, left_over = r + dr, c + dc, left_over - 1
+                if r >= height or c >= width or near[r, c] != near[r, c]:
+                    continue
+                gap = near[r, c] - here
+                spacing = unit * max(here, near[r, c]) if central else unit
+                if not abs(gap) > LEAST * spacing or not _steepest(row, col, r, c, dr, dc, gap, near, smear):
+                    continue
+                sigma, value = noise[i, j], 0.0
+                for apart in range(min(smear, bridged) + 1):
+                    p, q, u, v = row - apart * dr, col - apart * dc, r + apart * dr, c + apart * dc
+                    if p < 0 or q < 0 or u >= height or v >= width:
+                        break
+                    whole = (near[u, v] - near[p, q]) * (1.0 if gap > 0 else -1.0)
+                    if not whole > max(GAP * spacing, sure * sigma / 2):  # NaN too
+                        continue
+                    leap, left = _leap(p, q, u, v, dr, dc, near, ray, plane, noise, cell_of, own, misfit)
+                    value = max(value, min(leap / max(STEP * spacing, sure * left), whole / (GAP * spacing)))
+                if value > step[row, col]:
+                    step[row, col], side[row, col] = value, 4 if gap > 0 else 2
+                if value > step[r, c]:
+                    step[r, c], side[r, c] = value, 2 if gap > 0 else 4
 
 
 @part
@@ -225,14 +253,14 @@ def find_voids(rays: Rays) -> np.ndarray:
     """
     size = (1, BRIDGED + 1) if rays.apart[0] else (BRIDGED + 1, 1) if rays.apart[1] else (BRIDGE + 1,) * 2
     void = np.zeros(rays.near.shape, np.uint8)
-    run_slices(_voids, len(void), rays.near, size, void, size=_BAND)
+    run_slices(_voids, len(void), rays.near, size, void, size=4 * _BAND)
     return void
 
 
 def find_rims(near: np.ndarray, void: np.ndarray) -> np.ndarray:
     """Pixels beside a void; (H, W) bool."""
     rim = np.zeros(near.shape, np.bool_)
-    run_slices(_rims, len(near), near, void, rim, size=_BAND)
+    run_slices(_rims, len(near), near, void, rim, size=4 * _BAND)
     return rim
 
 
@@ -240,22 +268,16 @@ def find_rims(near: np.ndarray, void: np.ndarray) -> np.ndarray:
 def _voids(start, stop, near, size, void):
     """Mark what rectangles of a size that are all hole cover."""
     height, width = near.shape
-    for row in range(start, stop):
-        across = np.zeros(width, np.uint8)
-        for top in range(max(row - size[0] + 1, 0), min(row, height - size[0]) + 1):
-            run = 0
-            for col in range(width):
-                hole = True
-                for r in range(top, top + size[0]):
-                    if near[r, col] == near[r, col]:
-                        hole = False
-                        break
-                run = run + 1 if hole else 0
-                if run >= size[1]:
-                    for c in range(col - size[1] + 1, col + 1):
-                        across[c] = 1
+    deep = np.zeros(width, np.int64)  # rows of hole that end in the row, of each column
+    for row in range(max(start - size[0] + 1, 0), min(stop + size[0] - 1, height)):
+        run = 0
         for col in range(width):
-            void[row, col] = across[col]
+            deep[col] = deep[col] + 1 if near[row, col] != near[row, col] else 0
+            run = run + 1 if deep[col] >= size[0] else 0
+            if run >= size[1]:
+                for r in range(max(row - size[0] + 1, start), min(row + 1, stop)):
+                    for c in range(col if run > size[1] else col - size[1] + 1, col + 1):
+                        void[r, c] = 1
 
 
 @kernel

@@ -12,7 +12,7 @@ from edgel._range_image.rays import Rays
 CLOSE = 3.0  # spacings, and median differences of neighbours, within which a neighbour holds a pixel
 HELD = 2, 4  # of the 8 neighbours, or of the 24, that hold a pixel
 ON_LINE = 1, 2  # the same of the 2 or 4 on its own line, where lines lie far apart
-_BAND = 16  # rows
+_BAND = 64  # rows
 _SAMPLE = 4  # rows and columns between the pixels whose neighbours are compared
 
 
@@ -42,6 +42,10 @@ def _without_stray(start, stop, near, close, central, held, lines, kept):
             if own != own:
                 continue
             limit = np.float32(close * own) if central else np.float32(close)
+            # Nearly all are held by the two beside them, which are enough anywhere.
+            if lines[1] == 1 and 0 < col < width - 1:
+                if abs(near[row, col - 1] - own) <= limit and abs(near[row, col + 1] - own) <= limit:
+                    continue
             if _count(near, row, col, 1, lines, limit) >= held[0] or _count(near, row, col, 2, lines, limit) >= held[1]:
                 continue
             # Where the surface is steep, neighbours are farther away: as far as they are from each other.
