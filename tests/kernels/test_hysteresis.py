@@ -10,7 +10,6 @@ from hypothesis.extra import numpy as arrays
 from edgel._kernels.hysteresis import levels
 
 
-
 def image_of_levels(values, weak, least):
     found = np.zeros(values.size)
     places, level = levels(values, weak, least, 0.1)

@@ -25,13 +25,14 @@ def rough(shape, share=0.1, noise=0.2):
 def check(rays):
     facets = fit_facets(rays)
     wanted = naive.window_planes(rays.ray.astype(float), rays.near.astype(float), facets.cell, HALVES, FULL)
-    assert facets.plane.shape == wanted.shape
+    found = np.moveaxis(facets.plane, 1, 3)
+    assert found.shape == wanted.shape
     known = np.isfinite(wanted[..., 3])
-    assert np.array_equal(np.isfinite(facets.plane[..., 3]), known)
+    assert np.array_equal(np.isfinite(found[..., 3]), known)
     assert known.any()
     size = np.linalg.norm(wanted[known][:, :3], axis=1)
-    assert (np.abs(facets.plane[known][:, :3] - wanted[known][:, :3]).max(axis=1) < 1e-5 * size).all()
-    np.testing.assert_allclose(facets.plane[known][:, 3], wanted[known][:, 3], rtol=1e-4)
+    assert (np.abs(found[known][:, :3] - wanted[known][:, :3]).max(axis=1) < 1e-5 * size).all()
+    np.testing.assert_allclose(found[known][:, 3], wanted[known][:, 3], rtol=1e-4)
     return facets
 
 
@@ -66,10 +67,10 @@ def test_rays_of_cells_are_means(kind):
         near = rays.near[2 * i : 2 * i + 2, 2 * j : 2 * j + 2].ravel().astype(float)
         seen = np.isfinite(near)
         if not seen.any():
-            assert not facets.ray[i, j].any()
+            assert not facets.ray[:, i, j].any()
             continue
         ray = rays.ray[2 * i : 2 * i + 2, 2 * j : 2 * j + 2].reshape(-1, 3)[seen].astype(float)
-        np.testing.assert_allclose(facets.ray[i, j], [*ray.mean(axis=0), near[seen].mean()], rtol=1e-5, atol=1e-6)
+        np.testing.assert_allclose(facets.ray[:, i, j], [*ray.mean(axis=0), near[seen].mean()], rtol=1e-5, atol=1e-6)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -80,7 +81,7 @@ def test_far_from_the_middle_planes_keep_their_digits(kind):
     facets = fit_facets(rays)
     last = np.s_[:, -40:]
     wanted = naive.window_planes(rays.ray[last].astype(float), rays.near[last].astype(float), (2, 2), HALVES, FULL)
-    found, wanted = facets.plane[:, :, -10:-6], wanted[:, :, -10:-6]
+    found, wanted = np.moveaxis(facets.plane, 1, 3)[:, :, -10:-6], wanted[:, :, -10:-6]
     known = np.isfinite(wanted[..., 3])
     assert known.any()
     size = np.linalg.norm(wanted[known][:, :3], axis=1)
@@ -91,7 +92,7 @@ def test_far_from_the_middle_planes_keep_their_digits(kind):
 def test_without_noise_there_is_the_least(kind):
     rays = trace_rays(*image_of(kind, np.zeros((40, 40))))
     facets = fit_facets(rays)
-    np.testing.assert_allclose(facets.noise, FINEST * rays.spacing(facets.ray[:, :, 3]), rtol=0.5)
+    np.testing.assert_allclose(facets.noise, FINEST * rays.spacing(facets.ray[3]), rtol=0.5)
     assert facets.white
 
 
@@ -108,7 +109,7 @@ def test_small_images(shape):
     for height in (np.zeros(shape), np.full(shape, np.nan)):
         facets = fit_facets(trace_rays(*image_of("pinhole", height)))
         assert facets.noise.shape == tuple(-(-length // 2) for length in shape)
-        assert np.isinf(facets.plane[..., 3]).all()
+        assert np.isinf(facets.plane[:, 3]).all()
         assert np.isfinite(facets.noise).all()
 
 

@@ -58,12 +58,16 @@ def test_a_roof_is_found_where_it_is(noise, degrees, sign):
 def test_any_rays_show_it(kind):
     away = 0.6 * ROW + 0.8 * COL
     for sign in (-1, 1):
-        _, facets, folds = look(kind, sign * 0.8 * np.abs(away) + 0.2 * white(SHAPE), (0.5, 0.5))
-        sure = folds.level >= 1
-        assert sure.sum() > 20
-        off = np.abs(places(facets, folds)[sure] @ (0.6, 0.8))
-        assert np.quantile(off, 0.95) < 0.5
-        assert (folds.convex[sure] == (sign < 0)).all()
+        off = []
+        for seed in range(4):
+            _, facets, folds = look(kind, sign * 0.8 * np.abs(away) + 0.2 * white(SHAPE, seed), (0.5, 0.5))
+            sure = folds.level >= 1
+            assert sure.sum() > 20
+            assert (folds.convex[sure] == (sign < 0)).all()
+            off.extend(np.abs(places(facets, folds)[sure] @ (0.6, 0.8)))
+        # Seen aslant a tenth more is found by the lower quartile of what larger windows leave, and less well placed.
+        assert np.quantile(off, 0.95) < 0.6
+        assert np.median(off) < 0.15
 
 
 def test_pixels_that_are_not_square():
@@ -112,19 +116,19 @@ def test_smooth_surfaces_have_none(surface, noise):
         assert not (look(kind, height)[2].level >= 1).any()
 
 
-CAMERAS_BEND = pytest.mark.xfail(
-    reason="cameras see walls of 58 degrees bend faster than a parabola: up to 20 false cells"
+SPHERES_BEND = pytest.mark.xfail(
+    reason="spherical views see walls of 58 degrees bend faster than a parabola: up to 20 false cells"
 )
 
 
-@pytest.mark.parametrize("kind", ["parallel", *(pytest.param(k, marks=CAMERAS_BEND) for k in KINDS if k != "parallel")])
+@pytest.mark.parametrize("kind", ["parallel", "pinhole", pytest.param("spherical", marks=SPHERES_BEND)])
 def test_the_steep_walls_of_a_trough_have_none(kind):
     """Up to 58 degrees steep, and cut off there."""
     row, col = grid(120, 140)
     across = 0.8 * row + 0.6 * col
     inside = (across**2 < 76.5**2) & (row**2 + col**2 < 76.5**2)
     height = np.where(inside, 90 - np.sqrt(np.maximum(90**2 - across**2, 0)), np.nan)
-    for seed in range(3):
+    for seed in range(4):
         assert not (look(kind, height + 0.1 * white(row.shape, seed))[2].level >= 1).any()
 
 

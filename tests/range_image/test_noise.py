@@ -15,7 +15,7 @@ FINE = (0.5, 0.5)  # so narrow a view that its pixels are about alike
 def look(kind, height, pitch=FINE):
     rays = trace_rays(*image_of(kind, height, pitch))
     facets = fit_facets(rays)
-    return facets, facets.noise / rays.spacing(facets.ray[:, :, 3])
+    return facets, facets.noise / rays.spacing(facets.ray[3])
 
 
 @pytest.mark.parametrize("noise", [0.1, 0.3, 1.0])

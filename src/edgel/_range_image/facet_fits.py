@@ -19,6 +19,7 @@ HALVES = np.array([1, 3, 5])
 CELL = 2  # pixels along each side
 FULL = 0.6  # least share of a window that has to be seen
 FINEST = 0.01  # spacings: least noise; below, float32 rounds
+_USUAL = 0.25  # of the larger windows: of a view full of parts, most lie on edges
 _BAND = 48  # rows of cells
 _SUMS = 11  # q q^T (6), q near (3), near near, number
 
@@ -36,7 +37,7 @@ class Facets:
     noise : (I, J) float32
         Standard deviation of `near` around each cell, from the smallest windows.
     ratio : (S,) float64
-        By how much more larger windows leave, in the median: low-frequency noise.
+        By how much more larger windows leave, in the lower quartile: low-frequency noise.
     cell : (int, int)
         Rows and columns of pixels of a cell.
     cell_of : ((H,) int64, (W,) int64)
@@ -71,13 +72,12 @@ def fit_facets(rays: Rays) -> Facets:
     seen = ray[3 if rays.central else 2] > 0
     spacing = rays.spacing(np.where(seen, ray[3], np.nan))
     noise = np.fmax(noise_level(plane[0, 3]), FINEST * spacing).astype(np.float32)
-    few = np.s_[::2, ::2]
-    shares = (noise[few] / spacing[few])[seen[few]]
-    median = float(np.median(shares)) if len(shares) else 0.0
+    few = seen & (np.indices(shape).sum(axis=0) % 2 == 0)
+    median = float(np.median(noise[few] / spacing[few])) if few.any() else 0.0
     ratio = [1.0]
     for left in plane[1:, 3]:
-        shares = (left[few] / noise[few])[seen[few] & np.isfinite(left[few])]
-        ratio.append(max(float(np.median(shares)), 1.0) if len(shares) else 1.0)
+        fitted = few & np.isfinite(left)
+        ratio.append(max(float(np.quantile(left[fitted] / noise[fitted], _USUAL)), 1.0) if fitted.any() else 1.0)
     white = is_white(rays, noise, cell, median=median, num_seen=int(np.count_nonzero(seen)))
     cell_of = np.arange(rays.near.shape[0]) // cell[0], np.arange(rays.near.shape[1]) // cell[1]
     return Facets(ray, plane, noise, np.array(ratio), cell, cell_of, stretch, median, white)

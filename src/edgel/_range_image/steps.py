@@ -51,8 +51,8 @@ def find_steps(rays: Rays, facets: Facets, void: np.ndarray) -> tuple[np.ndarray
     own, misfit = np.full(shape, _UNKNOWN, np.int32), np.empty(shape, np.float32)
     for way in (0, 1):  # a pixel belongs to pairs of two rows: bands of the second way are columns
         run_slices(
-            _steps, shape[way], way, rays.near, rays.ray, facets.plane[0], facets.noise, facets.cell_of,
-            facets.cell[1], max(rays.side, rays.pitch[1 - way]), rays.central, sure, void, bridged[way], smear, own, misfit, step, side,
+            _steps, shape[way], way, rays.near, rays.ray, facets.plane[0], facets.noise, facets.cell_of, facets.cell[1],
+            max(rays.side, rays.pitch[1 - way]), rays.central, sure, void, bridged[way], smear, own, misfit, step, side,
             size=(1 + 3 * way) * _BAND,
         )  # fmt: skip
     level = np.zeros(step.size)

@@ -43,9 +43,9 @@ def _without_stray(start, stop, near, close, central, held, lines, kept):
                 continue
             limit = np.float32(close * own) if central else np.float32(close)
             # Nearly all are held by the two beside them, which are enough anywhere.
-            if lines[1] == 1 and 0 < col < width - 1:
-                if abs(near[row, col - 1] - own) <= limit and abs(near[row, col + 1] - own) <= limit:
-                    continue
+            beside = lines[1] == 1 and 0 < col < width - 1
+            if beside and abs(near[row, col - 1] - own) <= limit and abs(near[row, col + 1] - own) <= limit:
+                continue
             if _count(near, row, col, 1, lines, limit) >= held[0] or _count(near, row, col, 2, lines, limit) >= held[1]:
                 continue
             # Where the surface is steep, neighbours are farther away: as far as they are from each other.
