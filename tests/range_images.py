@@ -28,7 +28,7 @@ def image_of(kind: str, height: np.ndarray, pitch: tuple[float, float] = (1.0, 1
     axes, place = frame(), np.array([30.0, -20.0, 50.0])
     if kind == "parallel":
         own = np.stack([right, down, FAR - height], axis=-1)
-        depth, eye, angular = FAR - height, None, pitch
+        eye, angular = None, pitch
     else:
         if kind == "pinhole":
             ray = np.stack([right, down, np.full_like(right, FAR)], axis=-1)
@@ -39,14 +39,13 @@ def image_of(kind: str, height: np.ndarray, pitch: tuple[float, float] = (1.0, 1
             )
         # The same plane at the height 0 for every kind: along the ray, until the distance ahead is 100 less the height.
         own = ray / ray[..., 2:] * (FAR - height)[..., None]
-        depth, eye, angular = np.linalg.norm(own, axis=-1), place, (pitch[0] / FAR, pitch[1] / FAR)
+        eye, angular = place, (pitch[0] / FAR, pitch[1] / FAR)
     seen = np.isfinite(height)
     xyz = own[seen] @ axes + place
     index = np.full(height.shape, -1)
     index[seen] = np.arange(len(xyz))
     direction = axes[2]
-    depth = np.where(seen, depth, np.nan)
-    return RangeImage(depth, index, "organized", angular, eye, direction, np.zeros(len(xyz))), xyz
+    return RangeImage(index, "organized", angular, eye, direction, np.zeros(len(xyz))), xyz
 
 
 def grid(rows: int, cols: int) -> tuple[np.ndarray, np.ndarray]:

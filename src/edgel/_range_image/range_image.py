@@ -1,7 +1,7 @@
 """RangeImage: a cloud as a sensor sees it, one point a pixel.
 
 Organized clouds come as they are; any other points are projected along a direction, onto the image plane of a camera,
-or onto a sphere. Depth stays in the cloud's unit, as float64: no grey levels.
+or onto a sphere.
 """
 
 from __future__ import annotations
@@ -29,12 +29,10 @@ _MOST_PIXELS = 50  # for each point
 
 @dataclass(frozen=True, eq=False)
 class RangeImage:
-    """Which point each pixel shows, and how far from the viewer it is.
+    """Which point each pixel shows.
 
     Attributes
     ----------
-    depth : (H, W) float64
-        Distance from the viewpoint, or along the direction of parallel rays, in the cloud's unit; NaN = nothing.
     index : (H, W) int64
         Row of the point, among those the image was made of; -1 = nothing.
     method : str
@@ -50,7 +48,6 @@ class RangeImage:
         How far each point lies behind the one that its pixel shows, in spacings; 0 for the points shown.
     """
 
-    depth: np.ndarray
     index: np.ndarray
     method: str
     pitch: tuple[float, float]
@@ -61,7 +58,7 @@ class RangeImage:
     @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns."""
-        return self.depth.shape[0], self.depth.shape[1]
+        return self.index.shape[0], self.index.shape[1]
 
 
 def organized(
@@ -96,24 +93,17 @@ def organized(
         steps, eye, middle = across, None, direction
     else:
         steps = from_eye
-    image = np.full(shape, np.nan)
-    run_slices(
-        _show, len(xyz), xyz, rows, np.zeros(3) if eye is None else eye, eye is not None, middle, image.ravel(),
-        index.ravel(), size=65536,
-    )  # fmt: skip
+    if eye is not None:
+        run_slices(_hide, len(xyz), xyz, rows, eye, index.ravel(), size=65536)
     pitch = [pitch_of(step) for step in steps]
-    return RangeImage(image, index, "organized", (pitch[0], pitch[1]), eye, middle, np.zeros(len(xyz)))
+    return RangeImage(index, "organized", (pitch[0], pitch[1]), eye, middle, np.zeros(len(xyz)))
 
 
 @kernel
-def _show(start, stop, xyz, rows, eye, central, direction, depth, index):
+def _hide(start, stop, xyz, rows, eye, index):
+    """Show nothing where points lie in the viewpoint itself: sensors report shots without an echo so."""
     for p in range(start, stop):
-        x, y, z = xyz[p, 0] - eye[0], xyz[p, 1] - eye[1], xyz[p, 2] - eye[2]
-        if not central:
-            depth[rows[p]] = x * direction[0] + y * direction[1] + z * direction[2]
-        elif x != 0 or y != 0 or z != 0:
-            depth[rows[p]] = np.sqrt(x * x + y * y + z * z)
-        else:  # in the viewpoint itself: sensors report shots without an echo so
+        if xyz[p, 0] == eye[0] and xyz[p, 1] == eye[1] and xyz[p, 2] == eye[2]:
             index[rows[p]] = -1
 
 
@@ -211,14 +201,11 @@ def _rastered(
     index = np.full(height * width, -1)
     pixels = cells[:, 1] * width + cells[:, 0]
     _nearest(pixels, depth, xyz, index)
-    image = np.where(index >= 0, depth[index], np.nan)
     pitch = (float(size[1]), float(size[0]))
-    front = image[pixels]
+    front = depth[index[pixels]]
     spacing = np.sqrt(pitch[0] * pitch[1]) * (1.0 if viewpoint is None else np.maximum(front, 1e-300))
-    layout = (height, width)
-    return RangeImage(
-        image.reshape(layout), index.reshape(layout), method, pitch, viewpoint, forward, (depth - front) / spacing
-    )
+    behind = (depth - front) / spacing
+    return RangeImage(index.reshape(height, width), method, pitch, viewpoint, forward, behind)
 
 
 def image_pitch(picture: np.ndarray) -> tuple[float, float]:

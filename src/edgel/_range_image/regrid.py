@@ -43,7 +43,7 @@ class Grid:
         """See the points (N, 3) from above or below, void all around the grid: the surface ends where the map does."""
         direction = np.array([0.0, 0.0, 1.0 if from_below else -1.0])
         across = xyz * (1, 1, 0)
-        return self._seen(xyz @ direction, across, "organized", None, direction, [FRAME] * 4)
+        return self._seen(across, "organized", None, direction, [FRAME] * 4)
 
     def seen_from(self, xyz: np.ndarray, method: str, viewpoint: np.ndarray) -> RangeImage:
         """See the points (N, 3) from the viewpoint of their sensor.
@@ -59,26 +59,24 @@ class Grid:
         (last_row, last_col), (height, width) = np.array(self.shape) - 1, self.shape
         filled = [(row == 0, width), (row == last_row, width), (col == 0, height), (col == last_col, height)]
         void = [0 if np.count_nonzero(on) > long / 2 else FRAME for on, long in filled]
-        return self._seen(depth, rays, method, viewpoint, middle, void)
+        return self._seen(rays, method, viewpoint, middle, void)
 
     def _seen(
         self,
-        depth: np.ndarray,
         across: np.ndarray,
         method: str,
         viewpoint: np.ndarray | None,
         direction: np.ndarray,
         void: list[int],
     ) -> RangeImage:
-        """Fill an image, pixels of void above, below, left and right, from depths (N,) and places across (N, 3)."""
+        """Fill an image, pixels of void above, below, left and right, from places across (N, 3)."""
         top, bottom, left, right = void
         index = np.full((self.shape[0] + top + bottom, self.shape[1] + left + right), -1)
         index[self.cells // self.shape[1] + top, self.cells % self.shape[1] + left] = self.points
         steps = [np.linalg.norm(across[b] - across[a], axis=1) for a, b in neighbours(index)]
-        image = np.where(index >= 0, depth[index], np.nan)
-        behind = np.full(len(depth), np.inf)
+        behind = np.full(len(across), np.inf)
         behind[self.points] = 0.0
-        return RangeImage(image, index, method, (pitch_of(steps[0]), pitch_of(steps[1])), viewpoint, direction, behind)
+        return RangeImage(index, method, (pitch_of(steps[0]), pitch_of(steps[1])), viewpoint, direction, behind)
 
 
 def camera_grid(xyz: np.ndarray, viewpoint: np.ndarray) -> Grid | None:

@@ -26,7 +26,6 @@ NEARBY = 2  # cells within which the window of a pixel's own side lies
 HELD = 0.25  # of the gap beside it, within which neighbours hold a pixel that no window fits
 _SPREAD = 0.7, 1.0364  # quantile of chance that tells its spread, and the normal distribution's: chance has long tails
 _BAND = 16  # rows
-_UNKNOWN, _NONE = -2, -1  # for the cell of a pixel's own plane
 
 
 def find_steps(rays: Rays, facets: Facets, void: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -38,7 +37,7 @@ def find_steps(rays: Rays, facets: Facets, void: np.ndarray) -> tuple[np.ndarray
 
     Returns
     -------
-    (H, W) float64
+    (H, W) float32
         Highest threshold, in multiples of what is likely, at which hysteresis keeps the pixel; 0 where none does.
     (H, W) uint8
         `EdgeKind` flag of the side that the pixel lies on.
@@ -48,14 +47,13 @@ def find_steps(rays: Rays, facets: Facets, void: np.ndarray) -> tuple[np.ndarray
     # Where neighbours share no noise no sensor has smeared the steps, and chance is what it should be.
     smear, sure = (0, SURE) if facets.white else (SMEAR, SURE * _chance(rays, facets))
     bridged = [int(BRIDGED * min(rays.pitch) / rays.pitch[1 - way] + 0.5) for way in (0, 1)]
-    own, misfit = np.full(shape, _UNKNOWN, np.int32), np.empty(shape, np.float32)
     for way in (0, 1):  # a pixel belongs to pairs of two rows: bands of the second way are columns
         run_slices(
             _steps, shape[way], way, rays.near, rays.ray, facets.plane[0], facets.noise, facets.cell_of, facets.cell[1],
-            max(rays.side, rays.pitch[1 - way]), rays.central, sure, void, bridged[way], smear, own, misfit, step, side,
+            max(rays.side, rays.pitch[1 - way]), rays.central, sure, void, bridged[way], smear, step, side,
             size=(1 + 3 * way) * _BAND,
         )  # fmt: skip
-    level = np.zeros(step.size)
+    level = np.zeros(step.size, np.float32)
     for scale, chain, faintest in ((1.0, CHAIN, FAINTEST), (SHEER[0], SHEER[1], WEAK * SHEER[0] * FAINTEST)):
         places, found = levels(step, WEAK, chain, faintest)
         level[places] = np.fmax(level[places], found / scale)
@@ -67,17 +65,9 @@ def _chance(rays: Rays, facets: Facets) -> float:
     places = even_places(rays.near.shape)
     values = np.full((len(places), 2), np.nan, np.float32)
     run_slices(
-        _sample,
-        len(places),
-        places,
-        rays.near,
-        rays.ray,
-        facets.plane[0],
-        facets.noise,
-        facets.cell_of,
-        values,
+        _sample, len(places), places, rays.near, rays.ray, facets.plane[0], facets.noise, facets.cell_of, values,
         size=128,
-    )
+    )  # fmt: skip
     return spread(values, *_SPREAD)
 
 
@@ -125,17 +115,6 @@ def own_plane(row, col, near, ray, plane, cell_of):
 
 
 @part
-def _own(row, col, near, ray, plane, cell_of, own, misfit):
-    """Cell of a pixel's own plane, found when it is first asked for; negative where there is none."""
-    at = own[row, col]
-    if at == _UNKNOWN:
-        i, j, left = own_plane(row, col, near, ray, plane, cell_of)
-        at = i * plane.shape[2] + j if i >= 0 else _NONE
-        own[row, col], misfit[row, col] = at, left
-    return at
-
-
-@part
 def _held(row, col, gap, near):
     """Whether two of the eight neighbours are much nearer to a pixel than the gap is wide: no outlier."""
     count = 0
@@ -147,17 +126,15 @@ def _held(row, col, gap, near):
 
 
 @part
-def _leap(row, col, r, c, dr, dc, near, ray, plane, noise, cell_of, own, misfit):
+def _leap(row, col, r, c, dr, dc, near, ray, plane, noise, cell_of):
     """Step that neither side's slope explains, and its noise."""
     height, width = near.shape
     gap = near[r, c] - near[row, col]
     sigma = noise[cell_of[0][row], cell_of[1][col]]
-    one = _own(row, col, near, ray, plane, cell_of, own, misfit)
-    two = _own(r, c, near, ray, plane, cell_of, own, misfit)
+    i, j, misfit = own_plane(row, col, near, ray, plane, cell_of)
+    a, b, other = own_plane(r, c, near, ray, plane, cell_of)
     limit = 16 * sigma * sigma
-    fits, other = misfit[row, col] < limit, misfit[r, c] < limit
-    if one >= 0 and two >= 0 and fits and other:
-        i, j, a, b = one // plane.shape[2], one % plane.shape[2], two // plane.shape[2], two % plane.shape[2]
+    if i >= 0 and a >= 0 and misfit < limit and other < limit:
         here = there = 0.0
         for k in range(3):
             differs = plane[k, a, b] - plane[k, i, j]
@@ -169,7 +146,7 @@ def _leap(row, col, r, c, dr, dc, near, ray, plane, noise, cell_of, own, misfit)
         left = max(plane[3, i, j], plane[3, a, b], sigma)
         return min(abs(here), abs(there)), left
     # Too thin for a window: neighbours have to hold it, and the pixels behind tell the slope.
-    if (not fits and not _held(row, col, gap, near)) or (not other and not _held(r, c, gap, near)):
+    if (not misfit < limit and not _held(row, col, gap, near)) or (not other < limit and not _held(r, c, gap, near)):
         return 0.0, sigma
     leap = abs(gap)
     for s in range(2):
@@ -184,8 +161,7 @@ def _leap(row, col, r, c, dr, dc, near, ray, plane, noise, cell_of, own, misfit)
 
 @kernel
 def _steps(
-    start, stop, way, near, ray, plane, noise, cell_of, wide, unit, central, sure, void, bridged, smear, own, misfit,
-    step, side
+    start, stop, way, near, ray, plane, noise, cell_of, wide, unit, central, sure, void, bridged, smear, step, side
 ):  # fmt: skip
     height, width = near.shape
     dr, dc = (0, 1) if way == 0 else (1, 0)
@@ -219,7 +195,7 @@ def _steps(
                     whole = (near[u, v] - near[p, q]) * (1.0 if gap > 0 else -1.0)
                     if not whole > max(GAP * spacing, sure * sigma / 2):  # NaN too
                         continue
-                    leap, left = _leap(p, q, u, v, dr, dc, near, ray, plane, noise, cell_of, own, misfit)
+                    leap, left = _leap(p, q, u, v, dr, dc, near, ray, plane, noise, cell_of)
                     value = max(value, min(leap / max(STEP * spacing, sure * left), whole / (GAP * spacing)))
                 if value > step[row, col]:
                     step[row, col], side[row, col] = value, 4 if gap > 0 else 2
