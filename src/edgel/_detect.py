@@ -107,7 +107,7 @@ def detect(
     with stages("localisation"):
         kind = labels.of(kinds, min_strength)
         edge = np.flatnonzero(kind)
-        faces = None if classified is None else surface.faces(edge, (kind[edge] & EdgeKind.CREASE) > 0, k, viewpoint)
+        faces = None if classified is None else surface.faces(edge, kind[edge], k, viewpoint)
         faces = faces if seen is None else seen.faces(edge, xyz, viewpoint, faces)
     return Edges(
         index=finite.rows[edge],
