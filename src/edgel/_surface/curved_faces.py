@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from edgel._kernels.cholesky import factorize, invert_factorized
-from edgel._kernels.parallel import kernel
+from edgel._kernels.cholesky import explain, factorize, solve, variance_of
+from edgel._kernels.parallel import kernel, summing_kernel
 from edgel._neighbors.spacing import disc_spacing
 from edgel._surface import hinge
 from edgel._surface.neighborhood import relative
@@ -65,16 +65,18 @@ def fit_curved_faces(first, places, squared, queries, targets, xyz, fits, max_aw
         vectors /= spacing
         outside(fits[targets[first + q]], spacing, start)
         best[:] = start
-        noise, weight, least, at = 0.0, 0.0, np.inf, COUNTS[0]
+        noise, least, at, warm = 0.0, np.inf, COUNTS[0], False
         for count in COUNTS:
-            sigma = _fit(vectors[:, : min(count, k)], start, noise, weight, max_away, min_turn, scratch, found)
-            if found[STD] < least:
-                best[:], least, at = found, found[STD], count
-            if count == COUNTS[0]:
-                noise, weight = sigma, _WEIGHT
+            near, weight = vectors[:, : min(count, k)], _WEIGHT if noise > 0.0 else 0.0
+            sigma = _fit(near, best if warm else start, warm, noise, weight, max_away, min_turn, scratch, found)
+            warm = found[STD] < least
+            if warm:
+                best[:], least, at, noise = found, found[STD], count, noise if noise > 0.0 else sigma
         if at == COUNTS[0]:
+            weight = _WEIGHT_SMALLER if noise > 0.0 else 0.0
             for count in SMALLER:
-                _fit(vectors[:, : min(count, k)], start, noise, _WEIGHT_SMALLER, max_away, min_turn, scratch, found)
+                near = vectors[:, : min(count, k)]
+                _fit(near, start, False, noise, weight, max_away, min_turn, scratch, found)
                 if found[STD] < least:
                     best[:], least = found, found[STD]
         best[POSITION : POSITION + 3] *= spacing
@@ -83,13 +85,13 @@ def fit_curved_faces(first, places, squared, queries, targets, xyz, fits, max_aw
 
 @kernel
 def make_scratch():
-    """Make the scratch buffers of a fit: faces, frames, sums; powers; normal equations, factor, inverse, both sides."""
+    """Make the scratch buffers of a fit: faces, frames, sums; neighbours; normal equations, factor, inverse, both sides."""
     square = (_TERMS, _TERMS)
     return (
         np.empty((2, _TERMS)),
         np.empty((2, 3)),
         np.empty((2, _SUMS)),
-        np.empty(_SUMS),
+        np.empty((7, COUNTS[-1])),
         np.empty(square),
         np.empty(square),
         np.empty(square),
@@ -117,17 +119,18 @@ def outside(fit, spacing, edge):
 
 
 @kernel
-def _fit(vectors, start, noise, weight, max_away, min_turn, scratch, edge):
+def _fit(vectors, start, warm, noise, weight, max_away, min_turn, scratch, edge):
     """Fit both faces to neighbours (3, K), parted by which they lie farther outside of, part again, fit again.
 
     Writes the edge, its deviation infinite where there is none. Returns the standard deviation of the residuals, in
-    spacings, in which `noise` weighs as `weight` residuals.
+    spacings, in which `noise` weighs as `weight` residuals. A warm start goes on with the faces of the fit before.
     """
     faces, frames, sums = scratch[0], scratch[1], scratch[2]
-    edge[:], faces[:] = start, 0.0
-    _frames(edge, frames)
-    sigma, least, shift = 0.0, 0.0, np.inf
-    for turn in range(_ROUNDS):
+    edge[:], sigma, least = start, noise, noise
+    if not warm:
+        faces[:], sigma = 0.0, 0.0
+        _frames(edge, frames)
+    for turn in range(2 if warm else 0, _ROUNDS):
         _part(vectors, edge, _BAND * sigma, scratch)
         # Planes first, then any quadric, which tells the noise; that tells how much curvature is needed.
         squares, free, variance = weight * noise * noise, weight, 0.0
@@ -157,33 +160,57 @@ def _part(vectors, edge, band, scratch):
 
     What lies within the band of the edge counts for neither: noise decides where it goes, and would lift both.
     """
-    faces, frames, sums, power = scratch[0], scratch[1], scratch[2], scratch[3]
-    sums[:] = 0.0
-    for i in range(vectors.shape[1]):
-        x, y, z = vectors[0, i] - edge[0], vectors[1, i] - edge[1], vectors[2, i] - edge[2]
-        s = x * edge[LINE] + y * edge[LINE + 1] + z * edge[LINE + 2]
-        t = x * frames[0, 0] + y * frames[0, 1] + z * frames[0, 2]
-        u = x * frames[1, 0] + y * frames[1, 1] + z * frames[1, 2]
-        h = x * edge[FIRST] + y * edge[FIRST + 1] + z * edge[FIRST + 2]
-        g = x * edge[SECOND] + y * edge[SECOND + 1] + z * edge[SECOND + 2]
-        side = 0 if h - _height(faces[0], t, s) >= g - _height(faces[1], u, s) else 1
-        if side == 1:
-            t, h = u, g
-        if t < band:
-            continue
-        tt, ts, ss, own = t * t, t * s, s * s, sums[side]
-        power[0], power[1], power[2], power[3], power[4], power[5] = 1.0, t, s, tt, ts, ss
-        power[6], power[7], power[8], power[9] = tt * t, tt * s, t * ss, ss * s
-        power[10], power[11], power[12], power[13], power[14] = tt * tt, tt * ts, tt * ss, ts * ss, ss * ss
-        power[15], power[16], power[17], power[18] = h, h * t, h * s, h * tt
-        power[19], power[20], power[21] = h * ts, h * ss, h * h
-        for k in range(_SUMS):
-            own[k] += power[k]
+    faces, frames, sums, sides = scratch[0], scratch[1], scratch[2], scratch[3]
+    count = vectors.shape[1]
+    own, other, along, off, other_off = sides[0], sides[1], sides[2], sides[3], sides[4]
+    _project(vectors, edge, LINE, edge, along)
+    for side, (t, h) in enumerate(((own, off), (other, other_off))):
+        _project(vectors, frames[side], 0, edge, t)
+        _project(vectors, edge, FIRST + 3 * side, edge, h)
+    first, second = sides[5], sides[6]
+    fa, fb, fc = faces[0, 3], faces[0, 4], faces[0, 5]
+    ga, gb, gc = faces[1, 3], faces[1, 4], faces[1, 5]
+    for i in range(count):
+        s, t, u = along[i], own[i], other[i]
+        h = off[i] - (0.5 * fa * s * s + fb * t * s + 0.5 * fc * t * t)
+        g = other_off[i] - (0.5 * ga * s * s + gb * u * s + 0.5 * gc * u * u)
+        nearer = h >= g
+        first[i] = 1.0 if nearer and t >= band else 0.0
+        second[i] = 1.0 if not nearer and u >= band else 0.0
+    _sum_powers(own, along, off, first, count, sums[0])
+    _sum_powers(other, along, other_off, second, count, sums[1])
 
 
 @kernel
-def _height(face, t, s):
-    return face[3] * 0.5 * s * s + face[4] * t * s + face[5] * 0.5 * t * t
+def _project(vectors, axes, at, edge, out):
+    """Coordinates along a unit vector, from the edge's position on."""
+    x, y, z = axes[at], axes[at + 1], axes[at + 2]
+    level = edge[POSITION] * x + edge[POSITION + 1] * y + edge[POSITION + 2] * z
+    xs, ys, zs = vectors[0], vectors[1], vectors[2]
+    for i in range(vectors.shape[1]):
+        out[i] = xs[i] * x + ys[i] * y + zs[i] * z - level
+
+
+@summing_kernel
+def _sum_powers(ts, along, heights, weights, count, sums):
+    """Sum the powers of t and s up to the fourth, and those up to the second times h, and h squared."""
+    n, t1, s1, t2, ts1, s2, t3, t2s, ts2, s3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    t4, t3s, t2s2, ts3, s4 = 0.0, 0.0, 0.0, 0.0, 0.0
+    h1, ht, hs, ht2, hts, hs2, h2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(count):
+        w, t, s, h = weights[i], ts[i], along[i], heights[i]
+        wt, ws, wh = w * t, w * s, w * h
+        tt, st, ss = wt * t, wt * s, ws * s
+        n, t1, s1, t2, ts1, s2 = n + w, t1 + wt, s1 + ws, t2 + tt, ts1 + st, s2 + ss
+        t3, t2s, ts2, s3 = t3 + tt * t, t2s + tt * s, ts2 + t * ss, s3 + ss * s
+        t4, t3s, t2s2 = t4 + tt * t * t, t3s + tt * t * s, t2s2 + tt * s * s
+        ts3, s4 = ts3 + st * s * s, s4 + ss * s * s
+        h1, ht, hs, ht2, hts = h1 + wh, ht + wh * t, hs + wh * s, ht2 + wh * t * t, hts + wh * t * s
+        hs2, h2 = hs2 + wh * s * s, h2 + wh * h
+    sums[0], sums[1], sums[2], sums[3], sums[4], sums[5] = n, t1, s1, t2, ts1, s2
+    sums[6], sums[7], sums[8], sums[9] = t3, t2s, ts2, s3
+    sums[10], sums[11], sums[12], sums[13], sums[14] = t4, t3s, t2s2, ts3, s4
+    sums[15], sums[16], sums[17], sums[18], sums[19], sums[20], sums[21] = h1, ht, hs, ht2, hts, hs2, h2
 
 
 @kernel
@@ -202,31 +229,25 @@ def _fit_face(sums, sigma, model, noise, scratch, face):
             matrix[i, j] = sums[_POWER[i, j]] * _FACTOR[i] * _FACTOR[j]
         if i > 2:
             matrix[i, i] += stiff
-    factorize(matrix, lower)
-    left, penalty, terms, best = sums[_SUMS - 1], 0.0, max(model, _MODELS[0]), -np.inf
-    for i in range(_TERMS):
-        along[i] = right[i]
-        for k in range(i):
-            along[i] -= lower[i, k] * along[k]
-        along[i] /= lower[i, i]
-        left -= along[i] * along[i]
-        if i > 2:
-            penalty += math.log(lower[i, i] / math.sqrt(stiff))
-        if model == 0 and (i == 2 or i == 3 or i == 5):
-            evidence = -left / (2.0 * noise * noise) - penalty
-            if evidence > best:
-                terms, best = i + 1, evidence
-    invert_factorized(lower, terms, inverse)
-    left, told = sums[_SUMS - 1], float(terms)
+    factorize(matrix, lower, inverse)
+    terms = model
+    explain(inverse, right, along)
+    if model == 0:
+        left, penalty, best = sums[_SUMS - 1], 0.0, -np.inf
+        for i in range(_TERMS):
+            left -= along[i] * along[i]
+            if i > 2:
+                penalty += math.log(lower[i, i] / math.sqrt(stiff))
+            if i == 2 or i == 3 or i == 5:
+                evidence = -left / (2.0 * noise * noise) - penalty
+                if evidence > best:
+                    terms, best = i + 1, evidence
     face[:] = 0.0
-    for i in range(terms):
-        for j in range(terms):
-            face[i] += inverse[i, j] * right[j]
-        left -= along[i] * along[i]
-        if i > 2:
-            left -= stiff * face[i] * face[i]
-            told -= stiff * inverse[i, i]
-    return max(left, 0.0), told, inverse[0, 0]
+    left, told = sums[_SUMS - 1] - solve(inverse, along, face[:terms]), float(terms)
+    for i in range(3, terms):
+        left -= stiff * face[i] * face[i]
+        told -= stiff * variance_of(inverse, terms, i)
+    return max(left, 0.0), told, variance_of(inverse, terms, 0)
 
 
 @kernel

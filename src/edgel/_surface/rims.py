@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from edgel._kernels.cholesky import factorize, invert_factorized
+from edgel._kernels.cholesky import explain, factorize, solve, variance_of
 from edgel._kernels.parallel import kernel
 from edgel._neighbors.kdtree import NeighborIndex, build_index
 from edgel._neighbors.knn import visit_neighbors
@@ -81,7 +81,8 @@ def _find_across(first, places, squared, queries, targets, xyz, normals, noise, 
 @kernel
 def _fit_rims(first, places, squared, queries, targets, xyz, normals, across, rims):
     vectors, found = np.empty((3, places.shape[1])), np.empty(RIM)
-    matrix, lower, inverse, right = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    square = (_TERMS, _TERMS)
+    scratch = np.empty(square), np.empty(square), np.empty(square), np.empty(_TERMS), np.empty(_TERMS), np.empty(_TERMS)
     for q in range(places.shape[0]):
         row = targets[first + q]
         spacing, best = across[row, 3], rims[row]
@@ -93,7 +94,7 @@ def _fit_rims(first, places, squared, queries, targets, xyz, normals, across, ri
         for count in COUNTS:
             if count > places.shape[1]:
                 break
-            if _fit(vectors[:, :count], normals[row], across[row], matrix, lower, inverse, right, found):
+            if _fit(vectors[:, :count], normals[row], across[row], scratch, found):
                 if found[STD] < least:
                     best[:], least = found, found[STD]
         best[POSITION : POSITION + 3] *= spacing
@@ -101,8 +102,9 @@ def _fit_rims(first, places, squared, queries, targets, xyz, normals, across, ri
 
 
 @kernel
-def _fit(vectors, normal, outward, matrix, lower, inverse, right, rim):
-    """Fit the line to points (3, K), in spacings, twice: along the surface's end first, then along itself."""
+def _fit(vectors, normal, outward, scratch, rim):
+    """Fit a line to points (3, K), in spacings, straight at first, then bent, each along the one before."""
+    matrix, lower, inverse, right, along, line = scratch
     ox, oy, oz = outward[0], outward[1], outward[2]
     shift, sigma = 0.0, _NOISE
     for turn in range(3):
@@ -126,19 +128,11 @@ def _fit(vectors, normal, outward, matrix, lower, inverse, right, rim):
             return False
         matrix[1, 1] += 1e-6
         matrix[2, 2] += stiff
-        factorize(matrix, lower)
-        invert_factorized(lower, _TERMS, inverse)
-        left, free = total, number - 3.0 + stiff * inverse[2, 2]
-        slope, offset = 0.0, 0.0
-        for j in range(_TERMS):
-            value = inverse[j, 0] * right[0] + inverse[j, 1] * right[1] + inverse[j, 2] * right[2]
-            left -= value * right[j]
-            if j == 0:
-                offset = value
-            elif j == 1:
-                slope = value
-            else:
-                left -= stiff * value * value
+        factorize(matrix, lower, inverse)
+        explain(inverse, right, along)
+        left = total - solve(inverse, along, line) - stiff * line[2] * line[2]
+        free = number - _TERMS + stiff * variance_of(inverse, _TERMS, 2)
+        offset, slope = line[0], line[1]
         sigma = math.sqrt((max(left, 0.0) + _WEIGHT * _NOISE * _NOISE) / (free + _WEIGHT)) + _FLOOR
         shift = (shift + offset) / math.sqrt(1.0 + slope * slope)
         x, y, z = ox - slope * tx, oy - slope * ty, oz - slope * tz
@@ -151,5 +145,5 @@ def _fit(vectors, normal, outward, matrix, lower, inverse, right, rim):
     rim[LINE] = normal[1] * oz - normal[2] * oy
     rim[LINE + 1] = normal[2] * ox - normal[0] * oz
     rim[LINE + 2] = normal[0] * oy - normal[1] * ox
-    rim[STD] = math.sqrt(sigma * sigma * inverse[0, 0] + 0.4 * left / max(free, 1.0))
+    rim[STD] = math.sqrt(sigma * sigma * variance_of(inverse, _TERMS, 0) + 0.4 * left / max(free, 1.0))
     return True
