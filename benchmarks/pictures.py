@@ -46,6 +46,7 @@ def as_edges(scene: Scene, mask: np.ndarray) -> Edges:
         strength=np.ones(len(index)),
         position=scene.cloud.xyz[index],
         **one_face(np.full((len(index), 3), np.nan)),
+        orientation="unknown",
         num_points=len(scene.cloud),
         num_dropped=0,
         method="",

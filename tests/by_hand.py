@@ -38,6 +38,7 @@ def edges_at(cloud, rows, kind: Any = EdgeKind.CREASE, *, strength: Any = 1.0, n
         strength=np.broadcast_to(np.asarray(strength, float), len(rows)),
         position=cloud.xyz[rows],
         **one_face(np.broadcast_to(np.asarray(normals, float), (len(rows), 3))),
+        orientation="unknown",
         num_points=len(cloud),
         num_dropped=int((~np.isfinite(cloud.xyz).all(axis=1)).sum()),
         method="surface",

@@ -76,6 +76,10 @@ class Edges:
         cube, up to pi; NaN where only one face is known.
     convex : (E,) int8
         1 where the faces meet like the edge of a cube, -1 where like the edge of a hole, 0 where that is not known.
+    orientation : str
+        Who says which side is outside, that of the normals: "sensor" (they look towards it), "normals" (those that came
+        with the cloud), "outward" (the whole surface, see `edgel.detect`), or "unknown": then they look upwards (+Z) and
+        `convex` is 0.
     num_points : int
         Number of points of the input, finite or not.
     num_dropped : int
@@ -99,6 +103,7 @@ class Edges:
     normals: np.ndarray
     angle: np.ndarray
     convex: np.ndarray
+    orientation: str
     num_points: int
     num_dropped: int
     method: str

@@ -157,6 +157,7 @@ def detect(
         strength=np.clip(hits.strength / _STEP_RESPONSE, np.finfo(float).tiny, 1.0),
         position=checked.xyz[hits.rows],
         **one_face(planes.normals),
+        orientation="unknown",
         planes=planes,
         num_points=checked.num_input,
         num_dropped=checked.num_dropped,
