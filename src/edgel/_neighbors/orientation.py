@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import itertools
+import math
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel, run_slices
+from edgel._kernels.frames import tangents
+from edgel._kernels.parallel import kernel
 from edgel._neighbors.kdtree import NeighborIndex
-from edgel._neighbors.knn import knn
+from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.normals import Normals, fit_planes, no_planes
 from edgel._neighbors.queries import every_place
 from edgel.cloud import Cloud
@@ -19,7 +21,7 @@ SENSOR, OWN, OUTWARD, UNKNOWN = "sensor", "normals", "outward", "unknown"
 """Who says on which side of a surface its normals are: see `edgel.Edges.orientation`."""
 ORIENTS = ("auto", OUTWARD)
 
-NEIGHBORS = 10  # of each point, itself among them, that it is compared with
+NEIGHBORS, SECTORS = 48, 8  # of the neighbours of a point, the nearest in each sector is compared with it
 SPARSE = 2.0  # times the median distance of neighbours: points that lie farther apart may be stray
 _DIRECTIONS = np.array([np.array(d) / np.linalg.norm(d) for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
 
@@ -53,16 +55,16 @@ def outward_normals(index: NeighborIndex) -> np.ndarray:
     """Return normals of all points that look out of what the points enclose, (N, 3) float64; NaN where there is none.
 
     Neighbours are agreed pair by pair (Hoppe et al. 1992, doi:10.1145/133994.134011), whether a crease lies between them
-    or not (`_agreement`). Pieces grow by joining the one they agree with most, or disagree with most, over all pairs
+    or not (`_agree`). Pieces grow by joining the one they agree with most, or disagree with most, over all pairs
     between them: one pair that errs decides nothing. Last, the outermost points of each piece look outwards.
     """
     order, count = index.order, len(index)
     planes = _steady_planes(index)
-    around = knn(index, every_place(index), min(NEIGHBORS, count))
-    near, reach = np.argsort(order)[around.points[:, 1:]], around.distances[:, -1]
     xyz, normals = np.ascontiguousarray(index.xyz.T), planes.normals
-    agreement = np.empty(near.shape)
-    run_slices(_agreement, count, near, xyz, normals, planes.offset, agreement)
+    near, agreement = np.empty((count, SECTORS), np.int64), np.empty((count, SECTORS))
+    k = min(NEIGHBORS, count)
+    visit_neighbors(_agree, every_place(index), index, k, normals, planes.offset, near, agreement)
+    reach = np.linalg.norm(xyz[near] - xyz[:, None], axis=2).mean(axis=1)
     sign, piece = _join(np.repeat(np.arange(count), near.shape[1]), near.ravel(), agreement.ravel())
     sure = (agreement * sign[:, None] * sign[near]).mean(axis=1) - (reach > SPARSE * np.median(reach))
     sign *= _facing_out(xyz, normals * sign[:, None], sure, piece)[piece]
@@ -91,28 +93,41 @@ def _steady_planes(index: NeighborIndex) -> Normals:
 
 
 @kernel
-def _agreement(start, stop, near, xyz, normals, offset, agreement):
-    """Cosine of a normal and its neighbour's, seen in the plane midway between them: 1 where one surface has both.
+def _agree(first, places, squared, queries, targets, xyz, normals, offset, near, agreement):
+    """Choose the nearest neighbour in each of some sectors of the tangent plane, and say how far both normals agree.
 
-    That mirrors one face of a crease onto the other, whatever its angle, as it does two points of an arc. Points are
+    That is the cosine of one normal and the other's mirror image in the plane midway between the points: 1 where one
+    surface has both, since that mirrors one face of a crease onto the other, as it does two points of an arc. Points are
     laid onto their planes first, or noise would tilt what lies between near ones.
     """
-    for p in range(start, stop):
-        for i in range(near.shape[1]):
-            q = near[p, i]
-            dot, own, other, squared = 0.0, offset[p], offset[q], 0.0
-            for axis in range(3):
-                dot += normals[p, axis] * normals[q, axis]
-                own -= normals[p, axis] * xyz[p, axis]
-                other -= normals[q, axis] * xyz[q, axis]
-            ahead, behind = 0.0, 0.0
-            for axis in range(3):
-                step = (xyz[q, axis] + other * normals[q, axis]) - (xyz[p, axis] + own * normals[p, axis])
-                squared += step * step
-                ahead += step * normals[p, axis]
-                behind += step * normals[q, axis]
-            mirrored = dot - 2.0 * ahead * behind / squared if squared > 0.0 else dot
-            agreement[p, i] = mirrored if np.isfinite(mirrored) else 0.0
+    for q in range(places.shape[0]):
+        p = targets[first + q]
+        near[p], agreement[p] = p, 0.0
+        nx, ny, nz = normals[p, 0], normals[p, 1], normals[p, 2]
+        if not np.isfinite(nx):
+            continue
+        ux, uy, uz, vx, vy, vz = tangents(nx, ny, nz)
+        left = SECTORS
+        for i in range(1, places.shape[1]):
+            j = places[q, i]
+            x, y, z = xyz[0, j] - xyz[0, p], xyz[1, j] - xyz[1, p], xyz[2, j] - xyz[2, p]
+            turn = math.atan2(x * vx + y * vy + z * vz, x * ux + y * uy + z * uz) / (2.0 * math.pi)
+            sector = int((turn + 0.5) * SECTORS) % SECTORS
+            if near[p, sector] != p:
+                continue
+            mx, my, mz = normals[j, 0], normals[j, 1], normals[j, 2]
+            own = offset[p] - (nx * xyz[0, p] + ny * xyz[1, p] + nz * xyz[2, p])
+            other = offset[j] - (mx * xyz[0, j] + my * xyz[1, j] + mz * xyz[2, j])
+            x, y, z = x + other * mx - own * nx, y + other * my - own * ny, z + other * mz - own * nz
+            apart = x * x + y * y + z * z
+            cosine = nx * mx + ny * my + nz * mz
+            if apart > 0.0:
+                cosine -= 2.0 * (x * nx + y * ny + z * nz) * (x * mx + y * my + z * mz) / apart
+            if np.isfinite(cosine):
+                near[p, sector], agreement[p, sector] = j, cosine
+                left -= 1
+                if left == 0:
+                    break
 
 
 def _join(a: np.ndarray, b: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
