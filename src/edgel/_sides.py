@@ -1,4 +1,4 @@
-"""Which side of the faces is outside, by whoever knows: the sensor, normals that came with the cloud, or the whole surface."""
+"""Which side of the faces is outside, by whoever knows: the sensor, the cloud's own normals, or the whole surface."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 from edgel._faces import Faces
 from edgel._kernels.parallel import kernel
 from edgel._neighbors.knn import visit_neighbors
-from edgel._neighbors.orientation import OUTWARD, SENSOR, UNKNOWN, outward_normals
+from edgel._neighbors.normals import OUTWARD, SENSOR, UNKNOWN
+from edgel._neighbors.orientation import outward_normals
 from edgel._neighbors.queries import at_points
 from edgel._neighbors.spacing import disc_spacing
 from edgel._range_image.view import View
@@ -22,7 +23,7 @@ TOLD = 0.3  # of the votes, by which one side has to be ahead
 
 
 def viewer_of(view: View, viewpoint: np.ndarray | None, xyz: np.ndarray) -> np.ndarray | None:
-    """Return from where a cloud (N, 3) is seen, (3,): the viewpoint, or that of its view; None: from nowhere or above."""
+    """Return from where a cloud (N, 3) is seen, (3,): the viewpoint, or its view's; None: from nowhere or above."""
     if viewpoint is not None or view.image is None or view.image.viewpoint is not None:
         return viewpoint if view.image is None or viewpoint is not None else view.image.viewpoint
     if (view.image.direction == (0.0, 0.0, -1.0)).all():
@@ -31,9 +32,7 @@ def viewer_of(view: View, viewpoint: np.ndarray | None, xyz: np.ndarray) -> np.n
     return (xyz.min(axis=0) + xyz.max(axis=0)) / 2 - far * view.image.direction
 
 
-def orient_faces(
-    faces: Faces, orientation: str, edge: np.ndarray, surface: Surface, own: np.ndarray | None
-) -> Faces:
+def orient_faces(faces: Faces, orientation: str, edge: np.ndarray, surface: Surface, own: np.ndarray | None) -> Faces:
     """Turn the faces at edge points (E,), ascending, to the outside by whoever knows it (`edgel.Edges.orientation`).
 
     `own` (N, 3) are the normals that came with the cloud. Where nobody knows, and where the edge points along the same

@@ -78,8 +78,8 @@ class Edges:
         1 where the faces meet like the edge of a cube, -1 where like the edge of a hole, 0 where that is not known.
     orientation : str
         Who says which side is outside, that of the normals: "sensor" (they look towards it), "normals" (those that came
-        with the cloud), "outward" (the whole surface, see `edgel.detect`), or "unknown": then they look upwards (+Z) and
-        `convex` is 0.
+        with the cloud), "outward" (the whole surface, see `edgel.detect`), or "unknown": then they look upwards (+Z)
+        and `convex` is 0.
     num_points : int
         Number of points of the input, finite or not.
     num_dropped : int

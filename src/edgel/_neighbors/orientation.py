@@ -11,19 +11,19 @@ from edgel._kernels.frames import tangents
 from edgel._kernels.parallel import kernel
 from edgel._neighbors.kdtree import NeighborIndex
 from edgel._neighbors.knn import visit_neighbors
-from edgel._neighbors.normals import Normals, fit_planes, no_planes
+from edgel._neighbors.normals import OUTWARD, OWN, SENSOR, UNKNOWN, Normals, fit_planes, no_planes
 from edgel._neighbors.queries import every_place
 from edgel.cloud import Cloud
 
 COUNTS = (8, 16, 32)  # neighbours of the plane at each point
 WORSE = 2.0  # times the spread off the plane of fewer neighbours: with more they lie on it no longer
-SENSOR, OWN, OUTWARD, UNKNOWN = "sensor", "normals", "outward", "unknown"
-"""Who says on which side of a surface its normals are: see `edgel.Edges.orientation`."""
 ORIENTS = ("auto", OUTWARD)
 
 NEIGHBORS, SECTORS = 48, 8  # of the neighbours of a point, the nearest in each sector is compared with it
 SPARSE = 2.0  # times the median distance of neighbours: points that lie farther apart may be stray
-_DIRECTIONS = np.array([np.array(d) / np.linalg.norm(d) for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
+_DIRECTIONS = np.array(
+    [np.array(d) / np.linalg.norm(d) for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)]
+)
 
 
 def check_orient(orient: str, *, has_viewpoint: bool) -> None:
@@ -40,7 +40,7 @@ def who_knows(orient: str, *, sensor: bool, own: bool) -> str:
 
 
 def own_normals(cloud: Cloud) -> np.ndarray | None:
-    """Return the normals (N, 3) that came with a cloud as nx, ny, nz, None where it has none; they need not be units."""
+    """Return the normals (N, 3) that came with a cloud as nx, ny, nz, None where it has none; not always units."""
     names = {"_".join(name.split()).lower(): name for name in cloud.attributes}
     if not {"nx", "ny", "nz"} <= set(names):
         return None
@@ -54,8 +54,8 @@ def own_normals(cloud: Cloud) -> np.ndarray | None:
 def outward_normals(index: NeighborIndex) -> np.ndarray:
     """Return normals of all points that look out of what the points enclose, (N, 3) float64; NaN where there is none.
 
-    Neighbours are agreed pair by pair (Hoppe et al. 1992, doi:10.1145/133994.134011), whether a crease lies between them
-    or not (`_agree`). Pieces grow by joining the one they agree with most, or disagree with most, over all pairs
+    Neighbours are agreed pair by pair (Hoppe et al. 1992, doi:10.1145/133994.134011), whether a crease lies between
+    them or not (`_agree`). Pieces grow by joining the one they agree with most, or disagree with most, over all pairs
     between them: one pair that errs decides nothing. Last, the outermost points of each piece look outwards.
     """
     order, count = index.order, len(index)
@@ -97,8 +97,8 @@ def _agree(first, places, squared, queries, targets, xyz, normals, offset, near,
     """Choose the nearest neighbour in each of some sectors of the tangent plane, and say how far both normals agree.
 
     That is the cosine of one normal and the other's mirror image in the plane midway between the points: 1 where one
-    surface has both, since that mirrors one face of a crease onto the other, as it does two points of an arc. Points are
-    laid onto their planes first, or noise would tilt what lies between near ones.
+    surface has both, since that mirrors one face of a crease onto the other, as it does two points of an arc. Points
+    are laid onto their planes first, or noise would tilt what lies between near ones.
     """
     for q in range(places.shape[0]):
         p = targets[first + q]

@@ -1,8 +1,8 @@
 """Two curved faces that meet in an edge: where exactly, and how sure that is.
 
 Each face is a quadric over its own tangent plane. Its curvatures have a prior, since few neighbours under noise tell
-little of them: then it is nearly a plane, and the standard deviation of the position holds what that leaves open. Planes
-alone place the rim of a hole on the chord of its arc.
+little of them: then it is nearly a plane, and the standard deviation of the position holds what that leaves open.
+Planes alone place the rim of a hole on the chord of its arc.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ _FACTOR = np.array([1.0, 1.0, 1.0, 0.5, 1.0, 0.5])  # of each term, over its pow
 def fit_curved_faces(first, places, squared, queries, targets, xyz, fits, max_away, min_turn, edges):
     """Refine the edges of fits (M, 24) of two planes, by the rows that `edgel._surface.hinge` names.
 
-    Writes `edges` (M, 13), relative to the points, in the cloud's unit. Where curved faces make no edge within `max_away`
-    spacings of the point that turns by `min_turn` they are those of the planes, and the deviation is NaN.
+    Writes `edges` (M, 13), relative to the points, in the cloud's unit. Where curved faces make no edge within
+    `max_away` spacings of the point that turns by `min_turn` they are those of the planes, and the deviation is NaN.
     """
     k = places.shape[1]
     vectors, start, found = np.empty((3, k)), np.empty(EDGE), np.empty(EDGE)
@@ -85,7 +85,7 @@ def fit_curved_faces(first, places, squared, queries, targets, xyz, fits, max_aw
 
 @kernel
 def make_scratch():
-    """Make the scratch buffers of a fit: faces, frames, sums; neighbours; normal equations, factor, inverse, both sides."""
+    """Make the scratch buffers of a fit: faces, frames, sums, neighbours, and those of the normal equations."""
     square = (_TERMS, _TERMS)
     return (
         np.empty((2, _TERMS)),

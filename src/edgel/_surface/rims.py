@@ -58,7 +58,7 @@ def find_rims(index: NeighborIndex, points: np.ndarray, normals: np.ndarray, noi
 
 @kernel
 def _find_across(first, places, squared, queries, targets, xyz, normals, noise, across):
-    """Write the unit vector (M, 5) along the surface away from the neighbours' middle, spacing and noise in spacings."""
+    """Write the unit vector (M, 5) along the surface away from the neighbours' middle, the spacing, and the noise in it."""
     vectors = np.empty((3, places.shape[1]))
     for q in range(places.shape[0]):
         row = targets[first + q]
@@ -94,9 +94,8 @@ def _fit_rims(first, places, squared, queries, targets, xyz, normals, across, ri
         for count in COUNTS:
             if count > places.shape[1]:
                 break
-            if _fit(vectors[:, :count], normals[row], across[row], scratch, found):
-                if found[STD] < least:
-                    best[:], least = found, found[STD]
+            if _fit(vectors[:, :count], normals[row], across[row], scratch, found) and found[STD] < least:
+                best[:], least = found, found[STD]
         best[POSITION : POSITION + 3] *= spacing
         best[STD] *= spacing
 
