@@ -7,7 +7,8 @@ import pytest
 
 import edgel
 from edgel import EdgeKind, Edges
-from edgel.edges import as_kinds, kind_names, one_face
+from edgel._faces import Faces
+from edgel.edges import as_kinds, kind_names
 
 NAN = np.nan
 LABELS = ["edge_kind", "edge_strength", "edge_angle", "edge_convex", "nx", "ny", "nz"]
@@ -94,13 +95,13 @@ def test_kinds_by_name():
 
 
 def test_one_face_leaves_the_rest_unknown():
-    fields = one_face(np.eye(3))
+    fields = vars(Faces.of_points(np.zeros((3, 3)), np.eye(3)))
     assert set(fields) < {field.name for field in dataclasses.fields(Edges)}
     np.testing.assert_array_equal(fields["normals"][:, 0], np.eye(3))
     for name in ("direction", "angle", "position_std"):
         assert np.isnan(fields[name]).all()
     assert np.isnan(fields["normals"][:, 1]).all()
-    assert one_face(np.empty((0, 3)))["normals"].shape == (0, 2, 3)
+    assert Faces.of_points(np.empty((0, 3)), np.empty((0, 3))).normals.shape == (0, 2, 3)
 
 
 def test_the_cloud_of_the_edge_points():

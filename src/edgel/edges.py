@@ -293,18 +293,6 @@ def kind_names(kinds: EdgeKind) -> list[str]:
     return [name for name, kind in _NAMES.items() if kind in kinds]
 
 
-def one_face(normals: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the fields of `Edges` that follow where no more is known than one normal (E, 3) a point."""
-    num = len(normals)
-    return {
-        "normals": np.stack([normals, np.full((num, 3), np.nan)], axis=1),
-        "position_std": np.full(num, np.nan),
-        "direction": np.full((num, 3), np.nan),
-        "angle": np.full(num, np.nan),
-        "convex": np.zeros(num, np.int8),
-    }
-
-
 def _columns(table: np.ndarray, names: tuple[str, ...], dtype: type) -> dict[str, np.ndarray]:
     return {name: np.ascontiguousarray(table[:, i], dtype) for i, name in enumerate(names)}
 

@@ -12,7 +12,7 @@ HALF = np.sqrt(0.5)
 
 
 def wedge(up, swapped=False, flipped=(1, 1)):
-    """The edge of the fit of a right-angled ridge (up 1) or groove (up -1) along y, its line half a unit above the point."""
+    """The edge of a right-angled ridge (up 1) or groove (up -1) along y, its line half a unit above the point."""
     fit = np.zeros((1, hinge.HINGE), np.float32)
     sides = [((HALF, 0, HALF), (1, 0, -up)), ((-HALF, 0, HALF), (-1, 0, -up))]
     sides = [((normal[0] * up, 0, normal[2]), centroid) for normal, centroid in sides]
@@ -94,8 +94,8 @@ def test_rims_of_holes_are_placed_without_bias_and_say_how_sure_that_is(radius, 
     assert np.median(np.linalg.norm(error, axis=1)) <= off
     known = np.isfinite(std)
     assert known.mean() > 0.8
-    if noise:  # without, what is stated is a floor
-        assert 0.6 < np.sqrt(np.mean((np.linalg.norm(error[known], axis=1) / std[known]) ** 2)) < 1.5
+    if noise:  # without, what is stated is a floor; of a normal error in two directions the median is 0.83
+        assert 0.5 < np.median(np.linalg.norm(error[known], axis=1) / std[known]) < 1.3
 
 
 @pytest.mark.parametrize("pattern", ["uniform", "blue_noise", "vertices"])
@@ -109,7 +109,7 @@ def test_ends_of_a_surface_have_a_place_a_tangent_and_a_deviation(pattern):
     before, after = inside(scene.cloud.xyz[found.index]), inside(found.position)
     assert np.isfinite(found.position_std).mean() > 0.98
     assert abs(after.mean()) <= max(0.4 * before.mean(), 0.06)
-    assert 0.2 < np.sqrt(np.nanmean((after / found.position_std) ** 2)) < 1.5
+    assert np.nanmedian(np.abs(after) / found.position_std) < 1.2
     along = np.abs(found.direction[:, :2]).max(axis=1)
     assert np.nanmedian(np.degrees(np.arccos(np.clip(along, 0, 1)))) < 4
     np.testing.assert_allclose(found.position[:, 2], 0, atol=1e-9)

@@ -283,12 +283,7 @@ def _move(edge, scratch, max_away, min_turn):
     sine2 = 1.0 - cosine * cosine
     a, b = (faces[0, 0] - cosine * faces[1, 0]) / sine2, (faces[1, 0] - cosine * faces[0, 0]) / sine2
     faces[:, :3] = 0.0
-    x = edge[FIRST + 1] * edge[SECOND + 2] - edge[FIRST + 2] * edge[SECOND + 1]
-    y = edge[FIRST + 2] * edge[SECOND] - edge[FIRST] * edge[SECOND + 2]
-    z = edge[FIRST] * edge[SECOND + 1] - edge[FIRST + 1] * edge[SECOND]
-    sign = -1.0 if x * edge[LINE] + y * edge[LINE + 1] + z * edge[LINE + 2] < 0.0 else 1.0
-    sign /= math.sqrt(sine2)
-    edge[LINE], edge[LINE + 1], edge[LINE + 2] = sign * x, sign * y, sign * z
+    edge[LINE : LINE + 3] = np.cross(edge[FIRST : FIRST + 3], edge[SECOND : SECOND + 3]) / math.sqrt(sine2)
     for axis in range(3):
         edge[POSITION + axis] += a * edge[FIRST + axis] + b * edge[SECOND + axis]
     along = _dot(edge, POSITION, edge, LINE)

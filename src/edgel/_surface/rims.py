@@ -58,7 +58,7 @@ def find_rims(index: NeighborIndex, points: np.ndarray, normals: np.ndarray, noi
 
 @kernel
 def _find_across(first, places, squared, queries, targets, xyz, normals, noise, across):
-    """Write the unit vector (M, 5) along the surface away from the neighbours' middle, the spacing, and the noise in it."""
+    """Write the unit vector (M, 5) along the surface away from the neighbours' middle, the spacing, and noise in it."""
     vectors = np.empty((3, places.shape[1]))
     for q in range(places.shape[0]):
         row = targets[first + q]
