@@ -121,9 +121,10 @@ def detect(
         faces = None if classified is None else surface.faces(edge, kind[edge], k, viewer)
         faces = faces if seen is None else seen.faces(edge, xyz, viewer, faces)
     own = own_normals(cloud)
+    own = None if own is None else own[finite.rows]
     orientation = who_knows(orient, sensor=viewpoint is not None or seen is not None, own=own is not None)
     with stages("orientation"):
-        faces = orient_faces(faces, orientation, edge, surface, None if own is None else own[finite.rows])
+        faces = orient_faces(faces, orientation, edge, labels.strength[edge] >= LIKELY, surface, own)
     return Edges(
         index=finite.rows[edge],
         kind=kind[edge],

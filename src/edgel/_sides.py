@@ -32,11 +32,19 @@ def viewer_of(view: View, viewpoint: np.ndarray | None, xyz: np.ndarray) -> np.n
     return (xyz.min(axis=0) + xyz.max(axis=0)) / 2 - far * view.image.direction
 
 
-def orient_faces(faces: Faces, orientation: str, edge: np.ndarray, surface: Surface, own: np.ndarray | None) -> Faces:
+def orient_faces(
+    faces: Faces,
+    orientation: str,
+    edge: np.ndarray,
+    sure: np.ndarray,
+    surface: Surface,
+    own: np.ndarray | None,
+) -> Faces:
     """Turn the faces at edge points (E,), ascending, to the outside by whoever knows it (`edgel.Edges.orientation`).
 
-    `own` (N, 3) are the normals that came with the cloud. Where nobody knows, and where the edge points along the same
-    edge do not agree, nothing is convex or concave.
+    `sure` (E,) bool are those more likely edge points than not, whichever were asked for; `own` (N, 3) are the normals
+    that came with the cloud. Where nobody knows, and where the edge points along the same edge do not agree, nothing is
+    convex or concave.
     """
     if orientation == SENSOR or not len(edge):
         return faces
@@ -45,7 +53,7 @@ def orient_faces(faces: Faces, orientation: str, edge: np.ndarray, surface: Surf
     index, votes, pooled = surface.index, np.zeros(len(edge)), np.zeros(len(edge))
     normals = outward_normals(index) if own is None or orientation == OUTWARD else own
     queries, row = at_points(index, edge), np.full(len(index), -1)
-    row[edge] = np.arange(len(edge))
+    row[edge[sure]] = np.flatnonzero(sure)
     arguments = (faces.position, faces.normals, normals[index.order], votes)
     visit_neighbors(_ask, queries, index, min(AROUND, len(index)), *arguments)
     bends = faces.convex * votes

@@ -23,6 +23,7 @@ def localize(
     num_neighbors: int,
     creases: Classification,
     ends: np.ndarray,
+    outermost: np.ndarray,
     viewpoint: np.ndarray | None,
 ) -> Faces:
     """Say where exactly the edge runs at each edge point, and how the surface lies on either side.
@@ -42,6 +43,8 @@ def localize(
         Of those edge points that lie on a crease.
     ends : (E,) bool
         Those where the surface ends.
+    outermost : (K,) int64
+        The points that surely are where it ends, whatever edge points are asked for.
     viewpoint : (3,) float64 or None
         Normals are turned towards it, or upwards (+Z) without one.
 
@@ -52,7 +55,7 @@ def localize(
     """
     faces = Faces.of_points(xyz[edge], planes.normals)
     noise = np.sqrt(planes.residual / max(num_neighbors - 3, 1))
-    _put_rims(faces, index, edge, planes, noise, ends)
+    _put_rims(faces, index, edge, planes, noise, ends, outermost)
     found = crease_faces(refined(index, creases), xyz[creases.points], viewpoint)
     known = creases.evidence.placed & (found.convex != 0)
     faces.put(np.searchsorted(edge, creases.points[known]), found, known)
@@ -90,12 +93,18 @@ def crease_faces(edges: np.ndarray, xyz: np.ndarray, viewpoint: np.ndarray | Non
 
 
 def _put_rims(
-    faces: Faces, index: NeighborIndex, edge: np.ndarray, planes: Normals, noise: np.ndarray, ends: np.ndarray
+    faces: Faces,
+    index: NeighborIndex,
+    edge: np.ndarray,
+    planes: Normals,
+    noise: np.ndarray,
+    ends: np.ndarray,
+    outermost: np.ndarray,
 ) -> None:
     """Put the place and the tangent of the surface's end into the faces of those edge points where it is one."""
     at = np.flatnonzero(ends & ~np.isnan(planes.offset))
     some = planes.take(at)
-    found = rims.find_rims(index, edge[at], some.normals, noise[at])
+    found = rims.find_rims(index, edge[at], outermost, some.normals, noise[at])
     known = ~np.isnan(found[:, rims.STD])
     at, found, some = at[known], found[known], some.take(known)
     place = faces.position[at] + found[:, rims.POSITION : rims.POSITION + 3]

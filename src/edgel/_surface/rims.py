@@ -10,7 +10,7 @@ from edgel._kernels.cholesky import explain, factorize, solve, variance_of
 from edgel._kernels.parallel import kernel
 from edgel._neighbors.kdtree import NeighborIndex, build_index
 from edgel._neighbors.knn import visit_neighbors
-from edgel._neighbors.queries import at_points, every_point
+from edgel._neighbors.queries import anywhere, at_points
 from edgel._neighbors.spacing import disc_spacing
 from edgel._surface.neighborhood import relative
 
@@ -27,14 +27,18 @@ _DEPTH = 1.25  # of outermost points inside the true end, over their spread: mea
 _ASIDE = 2.0  # spacings from the line: farther ones belong to another rim
 
 
-def find_rims(index: NeighborIndex, points: np.ndarray, normals: np.ndarray, noise: np.ndarray) -> np.ndarray:
-    """Fit a line with a bend to the outermost points around each of them.
+def find_rims(
+    index: NeighborIndex, points: np.ndarray, outermost: np.ndarray, normals: np.ndarray, noise: np.ndarray
+) -> np.ndarray:
+    """Fit a line with a bend to the outermost points around some.
 
     Parameters
     ----------
     index : NeighborIndex
     points : (M,) int64
-        The outermost points, ascending.
+        Ascending.
+    outermost : (K,) int64
+        The points that surely are where the surface ends.
     normals : (M, 3) float64
         Of the surface there.
     noise : (M,) float64
@@ -47,12 +51,13 @@ def find_rims(index: NeighborIndex, points: np.ndarray, normals: np.ndarray, noi
         tangent; NaN where there are too few points, or no normal.
     """
     rims, across = np.full((len(points), RIM), np.nan), np.full((len(points), 5), np.nan)
-    if len(points) >= COUNTS[0]:
+    if len(points) and len(outermost) >= COUNTS[0]:
         k = min(AROUND, len(index))
         visit_neighbors(_find_across, at_points(index, points), index, k, normals, noise, across)
-        alone = build_index(np.stack([index.xyz[axis, np.argsort(index.order)[points]] for axis in range(3)], axis=1))
-        k = min(COUNTS[-1], len(points))
-        visit_neighbors(_fit_rims, every_point(alone), alone, k, normals, across, rims)
+        place = np.argsort(index.order)
+        alone = build_index(index.xyz[:, place[outermost]].T.copy())
+        k, queries = min(COUNTS[-1], len(outermost)), anywhere(index.xyz[:, place[points]].T.copy())
+        visit_neighbors(_fit_rims, queries, alone, k, normals, across, rims)
     return rims
 
 

@@ -17,6 +17,8 @@ from edgel._surface.screen import Screening, screen
 from edgel._surface.statistics import cloud_statistics
 from edgel.edges import OUTLINES, EdgeKind
 
+SURE = 0.45  # probability of points that tell those beside them where the surface ends
+
 
 class Surface:
     """Neighbourhoods of a cloud and what they tell.
@@ -60,4 +62,5 @@ class Surface:
         planes = towards(planes, self.xyz[edge], viewpoint)
         creases = self.classified.take(np.isin(self.classified.points, edge[(kind & EdgeKind.CREASE) > 0]))
         ends = (kind & OUTLINES) > 0
-        return localize(self.index, self.xyz, edge, planes, num_neighbors, creases, ends, viewpoint)
+        outermost = self.classified.points[self.classified.outline > SURE]
+        return localize(self.index, self.xyz, edge, planes, num_neighbors, creases, ends, outermost, viewpoint)
