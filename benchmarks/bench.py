@@ -25,6 +25,7 @@ import geometry
 import growth
 import memory
 import normals
+import outside
 import promises
 import published
 import real_sensors
@@ -67,6 +68,7 @@ def main() -> None:
     results["normals"] = normals.run()
     results["geometry"] = geometry.run()
     results["wedges"] = geometry.wedges()
+    results["convexity"], results["rims"] = outside.convexity(), outside.rims()
     if not options.no_speed:
         sizes = (10_000, 100_000) if options.quick else (10_000, 30_000, 100_000, 300_000, 647_984)
         slowest = 2.0 if options.quick else speed.SLOWEST

@@ -18,7 +18,7 @@ from PIL import Image
 from rivals import RIVALS
 
 from edgel import EdgeKind, Edges, plot
-from edgel.edges import one_face
+from edgel._faces import Faces
 from edgel.synth import Scene
 
 DOCS = Path(__file__).parent.parent / "docs" / "benchmarks"
@@ -44,8 +44,8 @@ def as_edges(scene: Scene, mask: np.ndarray) -> Edges:
         index=index,
         kind=np.full(len(index), EdgeKind.CREASE, np.uint8),
         strength=np.ones(len(index)),
-        position=scene.cloud.xyz[index],
-        **one_face(np.full((len(index), 3), np.nan)),
+        **vars(Faces.of_points(scene.cloud.xyz[index], np.full((len(index), 3), np.nan))),
+        orientation="unknown",
         num_points=len(scene.cloud),
         num_dropped=0,
         method="",

@@ -128,6 +128,11 @@ def _details(results: dict[str, Any], rows: list[Row]) -> Iterator[str]:
     if results.get("wedges"):
         yield "## Wedges\n\nShare of a wedge's edge that edgel's default finds, within 1 and within 2.5 spacings, by the angle it turns (degrees); no noise."
         yield tables.wedges(results["wedges"])
+    if results.get("convexity"):
+        yield '## Outside\n\nCreases of closed solids with `orient="outward"`: share of the true ones found that are told convex or concave, and share of those told that are right.'
+        yield tables.rows_of(results["convexity"])
+        yield "Rims of holes, by radius and noise, in spacings: mean of how far the position lies outside (negative: inside) the rim, its spread, and the median deviation stated (in two directions)."
+        yield tables.rows_of(results["rims"])
     yield "## By the turn of the crease\n\nF1 at 1 spacing, all scenes of noise 0 without outliers, by the angle the surface turns (degrees)."
     yield tables.by_turn(rows)
     yield "![F1 against the turn of the crease](benchmarks/angle.png)"

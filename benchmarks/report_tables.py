@@ -72,6 +72,12 @@ def table(head: Sequence[str], lines: Iterable[Sequence[Any]]) -> str:
     return "\n".join(f"| {' | '.join(map(str, line))} |" for line in [head, ["---"] * len(head), *lines])
 
 
+def rows_of(rows: Sequence[Row]) -> str:
+    """Rows as they are, their keys as the head."""
+    lines = [[cell(value) if isinstance(value, float) else value for value in row.values()] for row in rows]
+    return table(list(rows[0]), lines)
+
+
 def cell(value: float, digits: int = 3) -> str:
     return "" if not np.isfinite(value) else f"{value:.{digits}f}"
 

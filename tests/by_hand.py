@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from edgel import Cloud, EdgeKind, Edges
-from edgel.edges import one_face
+from edgel._faces import Faces
 
 
 def grid(columns=60, rows=40, step=1.0):
@@ -36,8 +36,8 @@ def edges_at(cloud, rows, kind: Any = EdgeKind.CREASE, *, strength: Any = 1.0, n
         index=rows,
         kind=np.broadcast_to(np.asarray(kind, np.uint8), len(rows)),
         strength=np.broadcast_to(np.asarray(strength, float), len(rows)),
-        position=cloud.xyz[rows],
-        **one_face(np.broadcast_to(np.asarray(normals, float), (len(rows), 3))),
+        **vars(Faces.of_points(cloud.xyz[rows], np.broadcast_to(np.asarray(normals, float), (len(rows), 3)))),
+        orientation="unknown",
         num_points=len(cloud),
         num_dropped=int((~np.isfinite(cloud.xyz).all(axis=1)).sum()),
         method="surface",

@@ -15,7 +15,8 @@ import edgel
 from edgel import Cloud, synth
 
 FILE = Path(__file__).parent / "golden.npz"
-FIELDS = ("index", "kind", "strength", "position", "direction", "normals", "angle", "convex")
+FIELDS = ("index", "kind", "strength", "position", "position_std", "direction", "normals", "angle", "convex")
+PLANES = ("normals", "offset", "residual", "variation")
 EVERY = 20  # of how many points the plane fits are kept
 
 
@@ -48,7 +49,7 @@ def answers(cloud: Cloud) -> dict[str, np.ndarray]:
     }
     found = {f"{name}.{field}": getattr(edges(), field) for name, edges in asked.items() for field in FIELDS}
     planes = edgel.estimate_normals(cloud, num_neighbors=12).take(np.arange(0, len(cloud), EVERY))
-    return found | {f"planes.{name}": values for name, values in vars(planes).items()}
+    return found | {f"planes.{name}": getattr(planes, name) for name in PLANES}
 
 
 def _sweep() -> np.ndarray:

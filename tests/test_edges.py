@@ -7,11 +7,12 @@ import pytest
 
 import edgel
 from edgel import EdgeKind, Edges
-from edgel.edges import as_kinds, kind_names, one_face
+from edgel._faces import Faces
+from edgel.edges import as_kinds, kind_names
 
 NAN = np.nan
 LABELS = ["edge_kind", "edge_strength", "edge_angle", "edge_convex", "nx", "ny", "nz"]
-MORE = ["nx2", "ny2", "nz2", "tx", "ty", "tz", "edge_x", "edge_y", "edge_z"]
+MORE = ["nx2", "ny2", "nz2", "tx", "ty", "tz", "edge_x", "edge_y", "edge_z", "edge_std"]
 
 
 def cloud_of_five():
@@ -31,10 +32,12 @@ def edges_of_three(kind=(EdgeKind.CREASE, EdgeKind.BOUNDARY | EdgeKind.CREASE, E
         kind=np.array(kind, np.uint8),
         strength=np.array([1.0, 0.5, 0.1]),
         position=cloud_of_five().xyz[index] + [0.001, 0, 0],
+        position_std=np.array([0.01, 0.002, NAN]),
         direction=direction,
         normals=normals,
         angle=np.array([np.pi / 2, np.arccos(0.8), NAN]),
         convex=np.array([1, -1, 0], np.int8),
+        orientation="sensor",
         num_points=5,
         num_dropped=1,
         method="surface",
@@ -92,13 +95,13 @@ def test_kinds_by_name():
 
 
 def test_one_face_leaves_the_rest_unknown():
-    fields = one_face(np.eye(3))
+    fields = vars(Faces.of_points(np.zeros((3, 3)), np.eye(3)))
     assert set(fields) < {field.name for field in dataclasses.fields(Edges)}
     np.testing.assert_array_equal(fields["normals"][:, 0], np.eye(3))
-    for name in ("direction", "angle"):
+    for name in ("direction", "angle", "position_std"):
         assert np.isnan(fields[name]).all()
     assert np.isnan(fields["normals"][:, 1]).all()
-    assert one_face(np.empty((0, 3)))["normals"].shape == (0, 2, 3)
+    assert Faces.of_points(np.empty((0, 3)), np.empty((0, 3))).normals.shape == (0, 2, 3)
 
 
 def test_the_cloud_of_the_edge_points():
@@ -108,6 +111,7 @@ def test_the_cloud_of_the_edge_points():
     assert found.crs == cloud.crs
     np.testing.assert_array_equal(found.xyz, cloud.xyz[edges.index])
     np.testing.assert_array_equal(found.attributes["edge_x"], edges.position[:, 0])
+    np.testing.assert_array_equal(found.attributes["edge_std"], np.array([0.01, 0.002, NAN], np.float32))
     np.testing.assert_array_equal(found.attributes["nx2"], np.array([1, 0, NAN], np.float32))
     np.testing.assert_array_equal(found.attributes["ty"], np.array([1, 0, NAN], np.float32))
     types = {"edge_kind": "u1", "edge_convex": "i1", "edge_x": "f8", "edge_y": "f8", "edge_z": "f8"}

@@ -24,14 +24,20 @@ def test_answers_are_those_of_the_golden_file(name):
         np.testing.assert_array_equal(mine["kind"][a], wanted["kind"][b], err_msg=question)
         unlike = mine["convex"][a] != wanted["convex"][b]
         unlike |= np.abs(mine["strength"][a] - wanted["strength"][b]) > 0.01
-        for field, near in (("position", 0.02 * spacing), ("direction", 0.02), ("normals", 0.02), ("angle", 0.02)):
+        for field, near in (
+            ("position", 0.02 * spacing),
+            ("position_std", 0.02 * spacing),
+            ("direction", 0.02),
+            ("normals", 0.02),
+            ("angle", 0.02),
+        ):
             x, y = mine[field][a], wanted[field][b]
             if field == "direction":  # of either sign
                 x = x * np.where((x * y).sum(axis=1, keepdims=True) < 0, -1, 1)
             same = (np.abs(x - y) <= near + 1e-6 * np.abs(y)) | (np.isnan(x) & np.isnan(y))
             unlike |= ~same.reshape(len(a), int(np.prod(x.shape[1:]))).all(axis=1)
         assert unlike.sum() <= stray, question
-    for field in ("normals", "offset", "residual", "variation"):
+    for field in golden.PLANES:
         x, y = found[f"planes.{field}"], expected[f"planes.{field}"]
         same = np.isclose(x, y, rtol=1e-4, atol=1e-4 * max(1.0, spacing), equal_nan=True)
         assert same.mean() > 0.995, field

@@ -16,7 +16,7 @@ FLOORS = [
     {"cloud", "_intrinsics", "_depth", "_columns", "_kernels", "_stages"},
     {"edges", "_faces", "_neighbors", "io"},
     {"_scale", "_surface", "_range_image", "_color", "paper", "plot", "synth", "metrics"},
-    {"_labels", "_detect", "export"},
+    {"_labels", "_sides", "_detect", "export"},
     {"_report"},
     {"_demo", "_viewer"},
     {"_cli"},

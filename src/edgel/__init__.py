@@ -8,7 +8,8 @@ if TYPE_CHECKING:
     from edgel._depth import from_depth
     from edgel._detect import detect
     from edgel._intrinsics import Intrinsics
-    from edgel._neighbors.normals import Normals, estimate_normals
+    from edgel._neighbors.estimate import estimate_normals
+    from edgel._neighbors.normals import Normals
     from edgel.cloud import Cloud
     from edgel.edges import EdgeKind, Edges
     from edgel.io import FormatError, read, write
@@ -40,7 +41,7 @@ _HOMES = {
     "Intrinsics": "edgel._intrinsics",
     "Normals": "edgel._neighbors.normals",
     "detect": "edgel._detect",
-    "estimate_normals": "edgel._neighbors.normals",
+    "estimate_normals": "edgel._neighbors.estimate",
     "from_depth": "edgel._depth",
     "read": "edgel.io",
     "write": "edgel.io",

@@ -10,8 +10,10 @@ import numpy as np
 from edgel._color import color_channels, color_edges
 from edgel._labels import LIKELY, label_edges, strength_of_contrast
 from edgel._neighbors.normals import check_num_neighbors
+from edgel._neighbors.orientation import check_orient, own_normals, who_knows
 from edgel._range_image import METHODS, choose_view, see_edges, without_no_return
 from edgel._scale import at_scale, check_scale
+from edgel._sides import orient_faces, viewer_of
 from edgel._stages import Stages
 from edgel._surface import Surface
 from edgel.cloud import Cloud, Points, as_cloud, as_vector, check_points
@@ -29,6 +31,7 @@ def detect(
     scale: float = 1.0,
     num_neighbors: int = 16,
     viewpoint: Any = None,
+    orient: Literal["auto", "outward"] = "auto",
     progress: Callable[[str], None] | None = None,
 ) -> Edges:
     """Find the edge points of a cloud, their kind, and the surface on either side.
@@ -54,7 +57,13 @@ def detect(
     num_neighbors : int
         k of the plane fits that give the normals, the point itself among them; at least 3.
     viewpoint : (3,) array_like, optional
-        Normals are turned towards it. Default: the sensor's position when the cloud knows it, else from above (+Z).
+        Where the sensor stood. Default: what the cloud knows of it.
+    orient : {"auto", "outward"}
+        Which side of the surface is outside: that of the sensor, where its place or a view of the cloud is known, else
+        that of the cloud's own normals (nx, ny, nz), else it is not known: `Edges.convex` is 0, and normals are turned
+        upwards (+Z) for want of better. "outward" tells it from the whole surface instead: normals are carried from
+        neighbour to neighbour, and the outermost points look outwards; for closed surfaces, scanned all round.
+        `Edges.orientation` says which it was.
     progress : callable, optional
         Called with the name of each stage as it begins.
 
@@ -67,7 +76,7 @@ def detect(
     ------
     TypeError, ValueError
         If `points` carries no coordinates or fewer than 3 finite ones, or lies on one line or spot, where no surface
-        is; if an option is out of its range.
+        is; if an option is out of its range, or a viewpoint is given beside ``orient="outward"``.
 
     Examples
     --------
@@ -81,9 +90,10 @@ def detect(
     """
     kinds = as_kinds(kinds)
     _check_options(method, min_strength, scale)
+    check_orient(orient, has_viewpoint=viewpoint is not None)
     options = {"kinds": kinds, "method": method, "min_strength": min_strength, "num_neighbors": num_neighbors}
     if scale > 1:
-        return at_scale(detect, points, scale, progress=progress, viewpoint=viewpoint, **options)
+        return at_scale(detect, points, scale, progress=progress, viewpoint=viewpoint, orient=orient, **options)
     cloud, stages = as_cloud(points), Stages(progress)
     viewpoint = cloud.viewpoint if viewpoint is None else as_vector(viewpoint, "viewpoint")
     checked = check_points(cloud)
@@ -107,8 +117,17 @@ def detect(
     with stages("localisation"):
         kind = labels.of(kinds, min_strength)
         edge = np.flatnonzero(kind > 0)
-        faces = None if classified is None else surface.faces(edge, (kind[edge] & EdgeKind.CREASE) > 0, k, viewpoint)
-        faces = faces if seen is None else seen.faces(edge, xyz, viewpoint, faces)
+        viewer = viewer_of(view, viewpoint, xyz)
+        if seen is None:
+            faces = surface.faces(edge, kind[edge], k, viewer)
+        else:
+            fitted = None if classified is None else surface.faces(edge, kind[edge], k, viewer)
+            faces = seen.faces(edge, xyz, viewer, fitted)
+    own = own_normals(cloud)
+    own = None if own is None else own[finite.rows]
+    orientation = who_knows(orient, sensor=viewpoint is not None or seen is not None, own=own is not None)
+    with stages("orientation"):
+        faces = orient_faces(faces, orientation, edge, labels.strength[edge] >= LIKELY, surface, own)
     return Edges(
         index=finite.rows[edge],
         kind=kind[edge],
@@ -118,6 +137,7 @@ def detect(
         num_dropped=checked.num_dropped,
         method=view.method,
         reason=view.reason + missing,
+        orientation=orientation,
         parameters={"min_strength": min_strength, "num_neighbors": k},
         seconds=stages.seconds,
     )

@@ -15,7 +15,9 @@ class Faces:
     Attributes
     ----------
     position : (M, 3) float64
-        Foot of the point on the line in which the planes meet.
+        Foot of the point on the line in which the faces meet, or on that along which the surface ends.
+    position_std : (M,) float64
+        Root of the mean squared distance, in the cloud's unit, at which that line is to be expected from there.
     direction : (M, 3) float64
         Unit tangent of that line.
     normals : (M, 2, 3) float64
@@ -27,6 +29,7 @@ class Faces:
     """
 
     position: np.ndarray
+    position_std: np.ndarray
     direction: np.ndarray
     normals: np.ndarray
     angle: np.ndarray
@@ -37,6 +40,7 @@ class Faces:
         """Faces where one plane alone is known, its normals (M, 3): the position is the point itself."""
         return cls(
             position=xyz.copy(),
+            position_std=np.full(len(xyz), np.nan),
             direction=np.full((len(xyz), 3), np.nan),
             normals=np.stack([normals, np.full_like(normals, np.nan)], axis=1),
             angle=np.full(len(xyz), np.nan),

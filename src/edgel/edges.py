@@ -32,6 +32,9 @@ class EdgeKind(IntFlag):
     """The end of what the sensor sees, no edge of things: the first and last rows and columns of an organized cloud."""
 
 
+OUTLINES = EdgeKind.BOUNDARY | EdgeKind.OCCLUDING | EdgeKind.OCCLUDED
+"""The kinds where what is seen of a surface ends."""
+
 ASKABLE = EdgeKind(127) & ~EdgeKind.IMAGE
 """The kinds that a detector can be asked for; `EdgeKind.IMAGE` is the published method's alone."""
 
@@ -39,10 +42,11 @@ FIRST_COLUMNS = ("edge_kind", "edge_strength", "edge_angle", "edge_convex", "nx"
 """What `Edges.label` adds to a cloud, and `Edges.to_cloud` before its own."""
 _FACE_COLUMNS, _TANGENT_COLUMNS = ("nx2", "ny2", "nz2"), ("tx", "ty", "tz")
 _PLACE_COLUMNS = ("edge_x", "edge_y", "edge_z")
-ALL_COLUMNS = (*FIRST_COLUMNS, *_FACE_COLUMNS, *_TANGENT_COLUMNS, *_PLACE_COLUMNS)
+_STD_COLUMN = "edge_std"
+ALL_COLUMNS = (*FIRST_COLUMNS, *_FACE_COLUMNS, *_TANGENT_COLUMNS, *_PLACE_COLUMNS, _STD_COLUMN)
 """What `Edges.to_cloud` adds."""
 
-_PER_POINT = ("index", "kind", "strength", "position", "direction", "normals", "angle", "convex")
+_PER_POINT = ("index", "kind", "strength", "position", "position_std", "direction", "normals", "angle", "convex")
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +63,9 @@ class Edges:
         How marked the edge is, in (0, 1].
     position : (E, 3) float64
         The nearest place on the edge itself, in the cloud's unit; the point where the edge could not be placed better.
+    position_std : (E,) float64
+        How sure the position is: standard deviation of its distance from the edge (root mean square), in the cloud's
+        unit; NaN where that is not known, as where the edge could not be placed better than the point.
     direction : (E, 3) float64
         Unit tangent of the edge, of either sign; NaN where unknown.
     normals : (E, 2, 3) float64
@@ -69,6 +76,10 @@ class Edges:
         cube, up to pi; NaN where only one face is known.
     convex : (E,) int8
         1 where the faces meet like the edge of a cube, -1 where like the edge of a hole, 0 where that is not known.
+    orientation : str
+        Who says which side is outside, that of the normals: "sensor" (they look towards it), "normals" (those that came
+        with the cloud), "outward" (the whole surface, see `edgel.detect`), or "unknown": then they look upwards (+Z)
+        and `convex` is 0.
     num_points : int
         Number of points of the input, finite or not.
     num_dropped : int
@@ -87,10 +98,12 @@ class Edges:
     kind: np.ndarray
     strength: np.ndarray
     position: np.ndarray
+    position_std: np.ndarray
     direction: np.ndarray
     normals: np.ndarray
     angle: np.ndarray
     convex: np.ndarray
+    orientation: str
     num_points: int
     num_dropped: int
     method: str
@@ -168,7 +181,8 @@ class Edges:
 
         That is ``edge_kind`` (uint8), ``edge_strength``, ``edge_angle`` (radians), ``edge_convex`` (int8), the normals
         ``nx ny nz`` and ``nx2 ny2 nz2`` of the two faces, the tangent ``tx ty tz``, and the refined position ``edge_x
-        edge_y edge_z`` (float64); float32 but for those named otherwise, NaN where unknown. Attributes of the input
+        edge_y edge_z`` (float64) with its standard deviation ``edge_std``; float32 but for those named otherwise, NaN
+        where unknown. Attributes of the input
         that have one of these names are kept as ``input_nx`` and so on, ``input_nx_2``
         where that is there too, as after a second run.
         """
@@ -177,6 +191,7 @@ class Edges:
         columns |= _columns(self.normals[:, 1], _FACE_COLUMNS, np.float32)
         columns |= _columns(self.direction, _TANGENT_COLUMNS, np.float32)
         columns |= _columns(self.position, _PLACE_COLUMNS, np.float64)
+        columns |= {_STD_COLUMN: self.position_std.astype(np.float32)}
         return cloud.with_attributes(**columns)
 
     def label(self, points: Any) -> Cloud:
@@ -276,17 +291,6 @@ def kind_names(kinds: EdgeKind) -> list[str]:
     ['boundary', 'crease']
     """
     return [name for name, kind in _NAMES.items() if kind in kinds]
-
-
-def one_face(normals: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the fields of `Edges` that follow where no more is known than one normal (E, 3) a point."""
-    num = len(normals)
-    return {
-        "normals": np.stack([normals, np.full((num, 3), np.nan)], axis=1),
-        "direction": np.full((num, 3), np.nan),
-        "angle": np.full(num, np.nan),
-        "convex": np.zeros(num, np.int8),
-    }
 
 
 def _columns(table: np.ndarray, names: tuple[str, ...], dtype: type) -> dict[str, np.ndarray]:

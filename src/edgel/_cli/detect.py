@@ -26,9 +26,10 @@ HELP = """Find the edge points of a cloud, their kind, and their normals.
 The edge points are written with all attributes of the input and [bold]edge_kind[/bold] (flags: 1 boundary, 2 occluding,
 4 occluded, 8 crease, 16 color, 32 image), [bold]edge_strength[/bold] (0 to 1), [bold]edge_angle[/bold] between the two
 faces (radians), [bold]edge_convex[/bold] (1 convex, -1 concave, 0 unknown), the faces' normals [bold]nx ny nz nx2 ny2
-nz2[/bold], the edge's tangent [bold]tx ty tz[/bold] and refined place [bold]edge_x edge_y edge_z[/bold]; what is not
-known is NaN. The input's own columns of these names are kept as input_nx and so on. --all leaves out the second normal,
-the tangent and the place. Lengths are in the cloud's unit. Without -o only the summary is shown.
+nz2[/bold], the edge's tangent [bold]tx ty tz[/bold], refined place [bold]edge_x edge_y edge_z[/bold] and its standard
+deviation [bold]edge_std[/bold]; what is not known is NaN. The input's own columns of these names are kept as input_nx
+and so on. --all leaves out the second normal, the tangent and the place. Lengths are in the cloud's unit. Without -o
+only the summary is shown.
 
 \b
 Examples:
@@ -70,6 +71,7 @@ def detect(
         int | None, options.option(edgel.detect, "num_neighbors", "Neighbours of each plane fit, the point among them.")
     ] = None,
     viewpoint: options.Viewpoint = None,
+    orient: options.Orient = None,
     scale: Annotated[
         float | None,
         options.option(
@@ -112,6 +114,7 @@ def detect(
         min_strength=min_strength,
         num_neighbors=num_neighbors,
         viewpoint=viewpoint,
+        orient=orient,
         scale=scale,
         width=width,
         height=height,

@@ -13,6 +13,7 @@ from edgel._cli.compare import check_kept
 from edgel._cli.errors import ExitCode, exit_codes, failing_as
 from edgel._cli.output import count, print_line, print_table, renamed, seconds
 from edgel._cli.progress import Watch
+from edgel._cli.summary import ORIENTATIONS
 from edgel._columns import make_room, set_aside
 from edgel._stages import Stages
 
@@ -42,12 +43,13 @@ def normals(
         options.option(edgel.estimate_normals, "num_neighbors", "Neighbours of each plane fit, the point among them."),
     ] = None,
     viewpoint: options.Viewpoint = None,
+    orient: options.Orient = None,
     intrinsics: options.Intrinsics = None,
     no_clobber: options.NoClobber = False,
     debug: options.Debug = False,
 ) -> None:
     """Estimate the normal of every point of a cloud."""
-    given = options.given(num_neighbors=num_neighbors, viewpoint=viewpoint)
+    given = options.given(num_neighbors=num_neighbors, viewpoint=viewpoint, orient=orient)
     with exit_codes(debug=debug):
         files.check_output(output, no_clobber=no_clobber)
         in_place = files.check_in_place(output, source, intrinsics)
@@ -70,6 +72,7 @@ def normals(
             rows.append(("not finite", count(not_finite), "without a normal"))
         if planes.num_undefined > not_finite:
             rows.append(("normals undefined", count(planes.num_undefined - not_finite), "the neighbours span no plane"))
+        rows.append(("orientation", planes.orientation, ORIENTATIONS[planes.orientation]))
         rows.append(("time", seconds(sum(stages.seconds.values()))))
         rows += [(f"  {name}", seconds(duration)) for name, duration in stages.seconds.items()]
         print_table(f"Normals of {source}", rows)

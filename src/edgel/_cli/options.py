@@ -10,6 +10,7 @@ import typer
 
 import edgel
 from edgel._cli.errors import as_option
+from edgel._neighbors.orientation import ORIENTS
 from edgel._range_image import METHODS as OWN_METHODS
 from edgel.edges import ASKABLE, EdgeKind, kind_names
 
@@ -26,7 +27,7 @@ Viewpoint = Annotated[
     typer.Option(
         metavar="X Y Z",
         help="Where the sensor stood, in the cloud's unit: normals are turned towards it."
-        + " [dim]\\[default: what the file says, else from above][/dim]",
+        + " [dim]\\[default: what the file says][/dim]",
         show_default=False,
     ),
 ]
@@ -106,6 +107,16 @@ Kinds = Annotated[
         "kinds",
         f"Kinds of edge to look for, commas between: {', '.join(kind_names(ASKABLE))}.",
         metavar="NAMES",
+    ),
+]
+Orient = Annotated[
+    str | None,
+    option(
+        edgel.detect,
+        "orient",
+        f"The outside, to which normals are turned: {', '.join(ORIENTS)}. Auto: the side of the sensor, or of the "
+        "file's own nx ny nz, else nobody knows; outward: out of what a closed surface holds.",
+        metavar="NAME",
     ),
 ]
 METHOD = default_of(edgel.detect, "method")

@@ -11,6 +11,14 @@ from typing import Any
 from edgel._cli.output import count, seconds
 from edgel.edges import EdgeKind, Edges
 
+ORIENTATIONS = {
+    "sensor": "normals look towards it",
+    "normals": "on the side of those that came with the cloud",
+    "outward": "normals look out of what the surface holds",
+    "unknown": "normals look upwards; --viewpoint or --orient outward tell the outside",
+}
+"""What `edgel.Edges.orientation` means."""
+
 
 def creases(edges: Edges) -> dict[str, Any]:
     """Return the median angle of the creases, in degrees (NaN where none is known), and how many bend which way."""
@@ -44,6 +52,7 @@ def collect(
         "output": output,
         "report": None if page is None else str(page),
         "renamed": dict(renamed),
+        "orientation": edges.orientation,
         "method": edges.method,
         "reason": edges.reason,
         "points": edges.num_points,
@@ -70,6 +79,7 @@ def summary(edges: Edges, by_stage: dict[str, float]) -> list[tuple[str, ...]]:
     if edges.num_without_normal:
         rows.append(("normals undefined", count(edges.num_without_normal), "the neighbours span no plane"))
     rows.append(("method", edges.method, edges.reason))
+    rows.append(("orientation", edges.orientation, ORIENTATIONS[edges.orientation]))
     rows.append(("time", seconds(sum(by_stage.values()))))
     rows += [(f"  {name}", seconds(duration)) for name, duration in by_stage.items()]
     if (peak := peak_memory()) is not None:

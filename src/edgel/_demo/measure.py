@@ -10,8 +10,9 @@ from typing import Any
 
 from edgel import paper
 from edgel._demo.truth import FoundLength, Offsets
+from edgel._neighbors.estimate import estimate_normals
 from edgel._neighbors.kdtree import build_index
-from edgel._neighbors.normals import estimate_normals, fit_planes
+from edgel._neighbors.normals import fit_planes
 from edgel._neighbors.queries import anywhere, every_point
 from edgel.cloud import Cloud
 from edgel.paper import PaperEdges

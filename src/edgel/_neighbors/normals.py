@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from edgel._kernels.parallel import run_slices
-from edgel._neighbors.kdtree import NeighborIndex, build_index
+from edgel._neighbors.kdtree import NeighborIndex
 from edgel._neighbors.plane_fits import fit_slice
-from edgel._neighbors.queries import Queries, anywhere, every_point, tree_of
-from edgel.cloud import as_cloud, as_vector, check_points, check_rows
+from edgel._neighbors.queries import Queries, tree_of
 
+SENSOR, OWN, OUTWARD, UNKNOWN = "sensor", "normals", "outward", "unknown"
+"""Who says on which side of a surface its normals are: see `edgel.Edges.orientation`."""
+
+_PER_POINT = ("normals", "offset", "residual", "variation")
 _SLICE = 8192  # queries: the first chunk of a slice has none before it to guess its reach from
 
 
@@ -30,12 +32,16 @@ class Normals:
         e of eq. 20, the sum of squared distances of the neighbours to the plane, in the cloud's unit squared.
     variation : (M,) float64
         Surface variation, smallest over summed variance (Pauly et al. 2002): 0 on a plane, 1/3 at most.
+    orientation : str
+        Who says on which side they are: "sensor", "normals" (those that came with the cloud), "outward" (the whole
+        surface), or "unknown": then they look upwards (+Z).
     """
 
     normals: np.ndarray
     offset: np.ndarray
     residual: np.ndarray
     variation: np.ndarray
+    orientation: str = UNKNOWN
 
     def __len__(self) -> int:
         return len(self.normals)
@@ -47,12 +53,12 @@ class Normals:
 
     def take(self, rows: np.ndarray) -> Normals:
         """Return the planes of some rows."""
-        return Normals(self.normals[rows], self.offset[rows], self.residual[rows], self.variation[rows])
+        return replace(self, **{name: getattr(self, name)[rows] for name in _PER_POINT})
 
     def put(self, rows: np.ndarray, planes: Normals) -> None:
         """Overwrite the planes of some rows."""
-        for each in fields(self):
-            getattr(self, each.name)[rows] = getattr(planes, each.name)
+        for name in _PER_POINT:
+            getattr(self, name)[rows] = getattr(planes, name)
 
     def flipped(self, where: np.ndarray) -> Normals:
         """Return the same planes with the normals of a (M,) mask turned round."""
@@ -62,59 +68,8 @@ class Normals:
 
 def no_planes(count: int) -> Normals:
     """Return that many planes, all still undefined."""
-    return Normals(np.full((count, 3), np.nan), *(np.full(count, np.nan) for _ in range(3)))
-
-
-def estimate_normals(points: Any, *, at: Any = None, num_neighbors: int = 16, viewpoint: Any = None) -> Normals:
-    """Fit a plane to the k nearest neighbours of each point, or only of the points `at`.
-
-    Parameters
-    ----------
-    points : (N, 3) or (H, W, 3) array_like, Cloud, or an object that carries points
-        Neighbours are searched among all of its finite points, exactly.
-    at : (M,) int or (N,) bool, optional
-        Rows of the points whose normals are wanted; default all.
-    num_neighbors : int
-        k, the point itself among them; at least 3. Fewer are used when the cloud has fewer.
-    viewpoint : (3,) array_like, optional
-        Normals are turned towards it. Default: the sensor's position when the cloud knows it, else from above (+Z).
-
-    Returns
-    -------
-    Normals
-        One row a point asked for; the same whatever the order of the points and the number of threads.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If `points` carries no coordinates or fewer than 3 finite ones, or an option is out of its range.
-
-    Notes
-    -----
-    Total least squares as in eq. 20 of the paper: the eigenvector of the smallest eigenvalue of the neighbours' scatter
-    matrix.
-
-    Examples
-    --------
-    >>> import numpy as np, edgel
-    >>> x, y = np.meshgrid(np.arange(10.0), np.arange(10.0))
-    >>> edgel.estimate_normals(np.c_[x.ravel(), y.ravel(), 0 * x.ravel()], at=[44]).normals
-    array([[0., 0., 1.]])
-    """
-    cloud = as_cloud(points)
-    if viewpoint is None:
-        viewpoint = cloud.viewpoint
-    viewpoint = None if viewpoint is None else as_vector(viewpoint, "viewpoint")
-    checked = check_points(cloud)
-    index = build_index(checked.xyz)
-    k = check_num_neighbors(num_neighbors, len(index))
-    if at is None and checked.num_dropped == 0:
-        return towards(fit_planes(index, every_point(index), k), checked.xyz, viewpoint)
-    rows = np.arange(len(cloud)) if at is None else check_rows(at, len(cloud))
-    finite = np.asarray(np.isfinite(cloud.xyz[rows]).all(axis=1))
-    xyz = cloud.xyz[rows[finite]]
-    planes = fit_planes(index, anywhere(xyz), k) if len(xyz) else no_planes(0)
-    return _put_back(towards(planes, xyz, viewpoint), finite)
+    offset, residual, variation = np.full((3, count), np.nan)
+    return Normals(np.full((count, 3), np.nan), offset, residual, variation)
 
 
 def check_num_neighbors(num_neighbors: int, num_points: int) -> int:
@@ -164,12 +119,3 @@ def towards(planes: Normals, xyz: np.ndarray, viewpoint: np.ndarray | None) -> N
 def by_offset(planes: Normals) -> Normals:
     """Turn the normals so that ``D > 0``, the orientation of the paper (eq. 20)."""
     return planes.flipped(planes.offset < 0)
-
-
-def _put_back(planes: Normals, finite: np.ndarray) -> Normals:
-    """Put planes into the rows of a mask, NaN elsewhere."""
-    if finite.all():
-        return planes
-    full = no_planes(len(finite))
-    full.put(np.flatnonzero(finite), planes)
-    return full

@@ -1,74 +1,90 @@
-"""Where exactly an edge runs, and the surface on either side: from the best of the fits of two planes."""
+"""Where exactly an edge runs, and the surface on either side: creases from curved faces, ends from outermost points."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
 from edgel._faces import Faces, facing
-from edgel._surface import hinge
+from edgel._neighbors.kdtree import NeighborIndex
+from edgel._neighbors.knn import visit_neighbors
+from edgel._neighbors.normals import Normals
+from edgel._neighbors.queries import at_points
+from edgel._surface import rims
 from edgel._surface.classify import Classification
-from edgel._surface.evidence import MIN_TURN, Evidence
+from edgel._surface.curved_faces import COUNTS, EDGE, FIRST, LINE, POSITION, SECOND, STD, fit_curved_faces
+from edgel._surface.evidence import MAX_AWAY, MIN_TURN
 
 
 def localize(
-    creases: Classification, edge: np.ndarray, xyz: np.ndarray, normals: np.ndarray, viewpoint: np.ndarray | None
+    index: NeighborIndex,
+    xyz: np.ndarray,
+    edge: np.ndarray,
+    planes: Normals,
+    num_neighbors: int,
+    creases: Classification,
+    ends: np.ndarray,
+    outermost: np.ndarray,
+    viewpoint: np.ndarray | None,
 ) -> Faces:
     """Say where exactly the edge runs at each edge point, and how the surface lies on either side.
 
     Parameters
     ----------
-    creases : Classification
-        Of those edge points that lie on a crease.
-    edge : (E,) int64
-        The edge points, ascending.
+    index : NeighborIndex
     xyz : (N, 3) float64
         All points.
-    normals : (E, 3) float64
+    edge : (E,) int64
+        The edge points, ascending.
+    planes : Normals
         Of one plane fitted at each edge point: the first normal where no crease is known.
+    num_neighbors : int
+        Of each of them.
+    creases : Classification
+        Of those edge points that lie on a crease.
+    ends : (E,) bool
+        Those where the surface ends.
+    outermost : (K,) int64
+        The points that surely are where it ends, whatever edge points are asked for.
     viewpoint : (3,) float64 or None
         Normals are turned towards it, or upwards (+Z) without one.
 
     Returns
     -------
     Faces
-        One row an edge point; where no crease is known the position is the point itself.
+        One row an edge point; where neither crease nor end is known the position is the point itself.
     """
-    found = crease_faces(creases.evidence, xyz[creases.points], viewpoint)
-    known = found.convex != 0
-    at = np.searchsorted(edge, creases.points[known])
-    faces = Faces.of_points(xyz[edge], normals)
-    faces.put(at, found, known)
+    faces = Faces.of_points(xyz[edge], planes.normals)
+    noise = np.sqrt(planes.residual / max(num_neighbors - 3, 1))
+    _put_rims(faces, index, edge, planes, noise, ends, outermost)
+    found = crease_faces(refined(index, creases), xyz[creases.points], viewpoint)
+    known = creases.evidence.placed & (found.convex != 0)
+    faces.put(np.searchsorted(edge, creases.points[known]), found, known)
     return faces
 
 
-def crease_faces(evidence: Evidence, xyz: np.ndarray, viewpoint: np.ndarray | None) -> Faces:
-    """Describe the crease at each point (M, 3) by the fit that places it best (`Evidence.fit`).
+def refined(index: NeighborIndex, creases: Classification) -> np.ndarray:
+    """Fit curved faces to the neighbours of creases, from their best fit of two planes: see `fit_curved_faces`."""
+    edges = np.empty((len(creases.points), EDGE))
+    if len(edges):
+        k = min(COUNTS[-1], len(index))
+        arguments = (creases.evidence.fit.astype(np.float64), MAX_AWAY, MIN_TURN, edges)
+        visit_neighbors(fit_curved_faces, at_points(index, creases.points), index, k, *arguments)
+    return edges
+
+
+def crease_faces(edges: np.ndarray, xyz: np.ndarray, viewpoint: np.ndarray | None) -> Faces:
+    """Describe the creases (M, 13) at points (M, 3), by the columns that `edgel._surface.curved_faces` names.
 
     Normals are turned towards the viewpoint, or upwards (+Z) without one.
     """
-    found = evidence.fit.astype(np.float64)
-    a, b, line, foot, middle_a, middle_b = (
-        found[:, i : i + 3]
-        for i in (
-            hinge.FIRST_NORMAL,
-            hinge.SECOND_NORMAL,
-            hinge.LINE,
-            hinge.FOOT,
-            hinge.FIRST_CENTROID,
-            hinge.SECOND_CENTROID,
-        )
-    )
-    wing_a, wing_b = _wing(middle_a - foot, line), _wing(middle_b - foot, line)
-    turn = math.pi - np.arccos(np.clip((wing_a * wing_b).sum(axis=1), -1, 1))
-    known = evidence.placed & (turn > MIN_TURN)
-    # Turned so that each normal points away from the other face's wing, both lie on the outside of the wedge.
-    a, b = _away_from(a, wing_b), _away_from(b, wing_a)
+    a, b, line, foot = (edges[:, i : i + 3] for i in (FIRST, SECOND, LINE, POSITION))
+    turn = np.arccos(np.clip((a * b).sum(axis=1), -1, 1))
+    known = turn > MIN_TURN
     normals, sign = facing(xyz, (a, b), viewpoint)
     unknown = np.where(known, 1.0, np.nan)[:, None]
     return Faces(
         position=xyz + foot * unknown,
+        position_std=edges[:, STD] * unknown[:, 0],
         direction=line * unknown,
         normals=normals * unknown[:, None],
         angle=turn * unknown[:, 0],
@@ -76,12 +92,23 @@ def crease_faces(evidence: Evidence, xyz: np.ndarray, viewpoint: np.ndarray | No
     )
 
 
-def _wing(into: np.ndarray, line: np.ndarray) -> np.ndarray:
-    """Unit vectors from the line into a face."""
-    across = into - (into * line).sum(axis=1, keepdims=True) * line
-    length = np.linalg.norm(across, axis=1, keepdims=True)
-    return across / np.where(length > 0, length, np.nan)
-
-
-def _away_from(normals: np.ndarray, wing: np.ndarray) -> np.ndarray:
-    return np.where((normals * wing).sum(axis=1, keepdims=True) > 0, -normals, normals)
+def _put_rims(
+    faces: Faces,
+    index: NeighborIndex,
+    edge: np.ndarray,
+    planes: Normals,
+    noise: np.ndarray,
+    ends: np.ndarray,
+    outermost: np.ndarray,
+) -> None:
+    """Put the place and the tangent of the surface's end into the faces of those edge points where it is one."""
+    at = np.flatnonzero(ends & ~np.isnan(planes.offset))
+    some = planes.take(at)
+    found = rims.find_rims(index, edge[at], outermost, some.normals, noise[at])
+    known = ~np.isnan(found[:, rims.STD])
+    at, found, some = at[known], found[known], some.take(known)
+    place = faces.position[at] + found[:, rims.POSITION : rims.POSITION + 3]
+    off = (place * some.normals).sum(axis=1) - some.offset
+    faces.position[at] = place - off[:, None] * some.normals
+    faces.position_std[at] = found[:, rims.STD]
+    faces.direction[at] = found[:, rims.LINE : rims.LINE + 3]

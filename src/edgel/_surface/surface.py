@@ -15,6 +15,9 @@ from edgel._surface.classify import Classification, classify
 from edgel._surface.faces import localize
 from edgel._surface.screen import Screening, screen
 from edgel._surface.statistics import cloud_statistics
+from edgel.edges import OUTLINES, EdgeKind
+
+SURE = 0.45  # probability of points that tell those beside them where the surface ends
 
 
 class Surface:
@@ -50,12 +53,14 @@ class Surface:
         with self._stages("classification"):
             return classify(index, screening)
 
-    def faces(self, edge: np.ndarray, crease: np.ndarray, num_neighbors: int, viewpoint: np.ndarray | None) -> Faces:
-        """Say where the edge runs at points (E,), ascending, with flags (E,) of creases, and how the surface lies.
+    def faces(self, edge: np.ndarray, kind: np.ndarray, num_neighbors: int, viewpoint: np.ndarray | None) -> Faces:
+        """Say where the edge runs at points (E,), ascending, of kinds (E,), and how the surface lies on either side.
 
         Normals are turned towards the viewpoint, or upwards (+Z) without one.
         """
         planes = fit_planes(self.index, at_points(self.index, edge), num_neighbors)
-        normals = towards(planes, self.xyz[edge], viewpoint).normals
-        of_creases = np.isin(self.classified.points, edge[crease])
-        return localize(self.classified.take(of_creases), edge, self.xyz, normals, viewpoint)
+        planes = towards(planes, self.xyz[edge], viewpoint)
+        creases = self.classified.take(np.isin(self.classified.points, edge[(kind & EdgeKind.CREASE) > 0]))
+        ends = (kind & OUTLINES) > 0
+        outermost = self.classified.points[self.classified.outline > SURE]
+        return localize(self.index, self.xyz, edge, planes, num_neighbors, creases, ends, outermost, viewpoint)

@@ -13,6 +13,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from edgel._faces import Faces
 from edgel._neighbors.kdtree import bounds, build_index
 from edgel._neighbors.normals import Normals, by_offset, check_num_neighbors, fit_planes_within, no_planes
 from edgel._neighbors.queries import at_points
@@ -20,7 +21,7 @@ from edgel._neighbors.spacing import occupied_spacing
 from edgel._scale import at_scale, check_scale
 from edgel._stages import Stages
 from edgel.cloud import check_points
-from edgel.edges import EdgeKind, Edges, one_face
+from edgel.edges import EdgeKind, Edges
 from edgel.paper.canny import CannyResult, canny
 from edgel.paper.projection import PixelGrid, back_project, grey_image, points_near, project
 
@@ -155,8 +156,8 @@ def detect(
         index=checked.rows[hits.rows],
         kind=np.full(len(hits.rows), EdgeKind.IMAGE, np.uint8),
         strength=np.clip(hits.strength / _STEP_RESPONSE, np.finfo(float).tiny, 1.0),
-        position=checked.xyz[hits.rows],
-        **one_face(planes.normals),
+        **vars(Faces.of_points(checked.xyz[hits.rows], planes.normals)),
+        orientation="unknown",
         planes=planes,
         num_points=checked.num_input,
         num_dropped=checked.num_dropped,
