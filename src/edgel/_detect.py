@@ -96,18 +96,18 @@ def detect(
     with stages("edges in the view"):
         seen = None if view.image is None else see_edges(view.image, xyz, kinds)
     surface = Surface(xyz, stages)
-    classified = surface.classified if seen is None or seen.is_fine(kinds) else None
+    found = surface.strengths if seen is None or seen.is_fine(kinds) else None
     with stages("labels"):
-        labels = label_edges(xyz, classified, seen, None if viewpoint is not None else surface)
+        labels = label_edges(xyz, found, seen, None if viewpoint is not None else surface)
     if colors is not None:
-        normals = surface.screening.normals_of_points(surface.index)
+        normals = surface.normals
         with stages("color"):
             contrast = color_edges(surface.index, xyz, normals, colors).strength
             labels.add(np.arange(len(xyz)), EdgeKind.COLOR, strength_of_contrast(contrast))
     with stages("localisation"):
         kind = labels.of(kinds, min_strength)
         edge = np.flatnonzero(kind)
-        faces = None if classified is None else surface.faces(edge, (kind[edge] & EdgeKind.CREASE) > 0, k, viewpoint)
+        faces = None if found is None else surface.faces(edge, (kind[edge] & EdgeKind.CREASE) > 0, k, viewpoint)
         faces = faces if seen is None else seen.faces(edge, xyz, viewpoint, faces)
     return Edges(
         index=finite.rows[edge],
