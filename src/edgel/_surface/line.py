@@ -12,7 +12,7 @@ from edgel._neighbors.kdtree import NeighborIndex
 from edgel._neighbors.knn import knn
 from edgel._neighbors.queries import at_points
 
-EVEN = (0.2, 0.5)  # probability of an edge that is as likely as not: least, on the vaguest cloud, and most
+EVEN = (0.2, 0.5)  # probability that is as likely as not an edge's: least, on the vaguest cloud, and most
 SURE = 0.44  # where it lies on a cloud whose edges are plain; above it a point needs no other
 STRONG = 0.4  # what a chain of fainter points has to hold
 VAGUE = (0.2, 0.3)  # where it lies in that range, faint points come one abreast the more, the nearer to the end
@@ -64,11 +64,13 @@ def even_probability(probability: np.ndarray) -> float:
     """Return the probability that is as likely as not an edge's: half of the greatest expected F1, within `EVEN`.
 
     Lipton et al. 2014, doi:10.1007/978-3-662-44851-9_15: near one half where edges are plain, lower where noise leaves
-    none of them sure.
+    none of them sure. Where it would be lower than that there are no edges to speak of, and what is found has to be as
+    sure as elsewhere.
     """
     falling = np.sort(probability)[::-1]
     expected = np.cumsum(falling) / (np.arange(1, len(falling) + 1) + falling.sum())
-    return min(max(round(float(expected.max(initial=0.0)) / _STEP) * _STEP, EVEN[0]), EVEN[1])
+    even = round(float(expected.max(initial=0.0)) / _STEP) * _STEP
+    return min(even, EVEN[1]) if even >= EVEN[0] else SURE
 
 
 def strength_of(probability: np.ndarray, even: float) -> np.ndarray:
