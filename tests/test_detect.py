@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 import edgel
 from edgel import EdgeKind
-from edgel._labels import EVEN, strength_of_probability
 
 
 def box(spacing=0.02, seed=0):
@@ -213,13 +212,3 @@ def test_a_lower_strength_adds_points_and_changes_none(organized):
     kept = faint.take(faint.strength >= 0.5)
     for name in ("index", "kind", "strength", "position", "direction", "normals", "angle", "convex"):
         np.testing.assert_array_equal(getattr(kept, name), getattr(plain, name), err_msg=name)
-
-
-def test_one_half_is_where_the_expected_f1_is_greatest():
-    rng = np.random.default_rng(0)
-    for sharpness in (0.5, 1, 4):
-        chance = 1 / (1 + np.exp(-sharpness * rng.normal(-2, 2, 3000)))
-        scores = [2 * chance[chance >= t].sum() / ((chance >= t).sum() + chance.sum()) for t in chance]
-        best = np.clip(chance[np.argmax(scores)], *EVEN)
-        assert np.mean((strength_of_probability(chance) >= 0.5) != (chance >= best)) <= 1 / 3000
-    assert (strength_of_probability(np.full(10, 0.05)) < 0.5).all()  # a cloud without edges has none

@@ -168,7 +168,7 @@ def prepare(seed: int) -> Path:
     part = path.with_suffix(".part.npz")
     np.savez(
         part,
-        xyz=xyz,
+        xyz=screened.index.by_point(),
         points=points,
         features=evidence.features,
         fit=evidence.fit,

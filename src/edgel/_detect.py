@@ -106,11 +106,11 @@ def detect(
     with stages("edges in the view"):
         seen = None if view.image is None else see_edges(view.image, xyz, kinds)
     surface = Surface(xyz, stages)
-    classified = surface.classified if seen is None or seen.is_fine(kinds) else None
+    found = surface.strengths if seen is None or seen.is_fine(kinds) else None
     with stages("labels"):
-        labels = label_edges(xyz, classified, seen, None if viewpoint is not None else surface)
+        labels = label_edges(xyz, found, seen, None if viewpoint is not None else surface)
     if colors is not None:
-        normals = surface.screening.normals_of_points(surface.index)
+        normals = surface.normals
         with stages("color"):
             contrast = color_edges(surface.index, xyz, normals, colors).strength
             labels.add(np.arange(len(xyz)), EdgeKind.COLOR, strength_of_contrast(contrast))
@@ -121,7 +121,7 @@ def detect(
         if seen is None:
             faces = surface.faces(edge, kind[edge], k, viewer)
         else:
-            fitted = None if classified is None else surface.faces(edge, kind[edge], k, viewer)
+            fitted = None if found is None else surface.faces(edge, kind[edge], k, viewer)
             faces = seen.faces(edge, xyz, viewer, fitted)
     own = own_normals(cloud)
     own = None if own is None else own[finite.rows]

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from edgel._range_image import SeenEdges, explaining_view, sides
-from edgel._surface import Classification, Surface
+from edgel._surface import Strengths, Surface
 from edgel.edges import EdgeKind
 
 LIKELY = 0.5  # strength of an edge that is as likely as not
-EVEN = (0.45, 0.5)  # probability of an edge that is as likely as not: least, on the vaguest cloud, and most
 BOLD = np.radians(30.0)  # least turn of the creases that windows in the image add to those of neighbourhoods
 COLOR = 0.2  # contrast of a color edge that is as likely as not
 
@@ -38,38 +37,24 @@ class Labels:
         return np.where(self.strength >= min_strength, self.kind & np.uint8(kinds), np.uint8(0))
 
 
-def label_edges(
-    xyz: np.ndarray, classified: Classification | None, seen: SeenEdges | None, surface: Surface | None
-) -> Labels:
+def label_edges(xyz: np.ndarray, found: Strengths | None, seen: SeenEdges | None, surface: Surface | None) -> Labels:
     """Label the points (N, 3): outlines by the view where there is one, creases by view or surface.
 
     `surface`, where the sensor's place is not known: its outlines may be told apart by the direction that shows it all.
     """
     labels = Labels(len(xyz))
-    if classified is not None:
-        labels.add(classified.points, EdgeKind.CREASE, strength_of_probability(classified.crease))
+    if found is not None:
+        labels.add(found.points, EdgeKind.CREASE, found.crease)
     if seen is not None:
         # In much noise windows find what neighbourhoods miss, but bends as well.
-        bold = slice(None) if classified is None else seen.turn > BOLD
+        bold = slice(None) if found is None else seen.turn > BOLD
         labels.add(seen.creases[bold], EdgeKind.CREASE, seen.crease_strength[bold])
         labels.add(seen.points, seen.kind, seen.strength)
-    elif classified is not None:
+    elif found is not None:
         direction = None if surface is None else explaining_view(surface.index)
-        kind = EdgeKind.BOUNDARY if direction is None else sides(xyz, direction, classified.points)
-        labels.add(classified.points, kind, strength_of_probability(classified.outline))
+        kind = EdgeKind.BOUNDARY if direction is None else sides(xyz, direction, found.points)
+        labels.add(found.points, kind, found.outline)
     return labels
-
-
-def strength_of_probability(probability: np.ndarray) -> np.ndarray:
-    """Turn the probabilities of one kind into strengths, so that one half is the best place to draw the line.
-
-    The expected F1 is greatest at half of it (Lipton et al. 2014, doi:10.1007/978-3-662-44851-9_15): near one half
-    where edges are plain, lower where noise leaves none of them sure. Odds keep their ratio.
-    """
-    falling = np.sort(probability)[::-1]
-    expected = np.cumsum(falling) / (np.arange(1, len(falling) + 1) + falling.sum())
-    even = min(max(float(expected.max(initial=0.0)), EVEN[0]), EVEN[1])
-    return probability * (1 - even) / (probability * (1 - even) + even * (1 - probability))
 
 
 def strength_of_contrast(contrast: np.ndarray) -> np.ndarray:

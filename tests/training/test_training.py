@@ -8,6 +8,7 @@ from edgel._neighbors.kdtree import build_index
 from edgel._surface import classify, cloud_statistics, screen
 from edgel._surface.features import LEAF, NUM_EVIDENCE, NUM_SCREEN, POINT
 from edgel._surface.forest import evaluate, load_forests
+from edgel._surface.smoothing import smoothed
 from edgel._surface.training import add_context, screen_cloud, screening_features
 
 
@@ -38,7 +39,7 @@ def test_screening_features_are_in_the_layouts(made):
     assert found.features.shape == (asked.sum(), NUM_SCREEN)
     assert np.array_equal(np.sort(found.points), np.flatnonzero(asked))
     assert found.leaves.shape == (found.leaf.max() + 1, len(LEAF))
-    statistics = cloud_statistics(build_index(made.xyz))
+    statistics = cloud_statistics(smoothed(build_index(made.xyz)))
     for rows, layout in ((found.features, POINT), (found.leaves, LEAF)):
         np.testing.assert_array_equal(rows[:, layout.block("cloud")], np.broadcast_to(statistics, (len(rows), 8)))
     np.testing.assert_array_equal(np.bincount(found.leaf), found.leaves[:, LEAF.column("leaf.count")])
@@ -46,7 +47,7 @@ def test_screening_features_are_in_the_layouts(made):
 
 def test_the_screening_is_that_of_detection(made):
     forests = load_forests()
-    index = build_index(made.xyz)
+    index = smoothed(build_index(made.xyz))
     wanted = screen(index, cloud_statistics(index)).probability
     np.testing.assert_array_equal(screen_cloud(made.xyz, forests).probability[index.order], wanted)
     # Where the leaves let a point through, the forest says of its features what the screening says.
@@ -58,7 +59,7 @@ def test_the_screening_is_that_of_detection(made):
 
 def test_evidence_and_context_are_those_of_detection(made):
     forests = load_forests()
-    index = build_index(made.xyz)
+    index = smoothed(build_index(made.xyz))
     screening = screen(index, cloud_statistics(index))
     wanted = classify(index, screening)
     asked = np.zeros(len(made.xyz), bool)
@@ -66,7 +67,7 @@ def test_evidence_and_context_are_those_of_detection(made):
     points, evidence = screen_cloud(made.xyz, forests).gather_evidence(asked)
     assert evidence.features.shape == (len(points), NUM_EVIDENCE)
     crease, outline = (evaluate(forests[f"first {kind}"], evidence.features) for kind in ("crease", "outline"))
-    rows = add_context(made.xyz, points, evidence, crease, outline)
+    rows = add_context(index.by_point(), points, evidence, crease, outline)
     assert rows.shape == (len(points), len(POINT))
     order = np.argsort(points)
     np.testing.assert_array_equal(points[order], wanted.points)

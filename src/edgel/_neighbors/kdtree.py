@@ -53,6 +53,21 @@ class NeighborIndex:
         """Return the coordinates at some places (M,), (M, 3) float64."""
         return np.ascontiguousarray(self.xyz[:, places].T)
 
+    def by_point(self) -> np.ndarray:
+        """Return the coordinates of all points, (N, 3) float64."""
+        xyz = np.empty((len(self), 3))
+        xyz[self.order] = self.xyz.T
+        return xyz
+
+    def sampled(self, number: int) -> np.ndarray:
+        """Return about `number` places, ascending, by a hash of the coordinates and nothing else."""
+        if len(self) <= number:
+            return np.arange(len(self))
+        chosen = np.empty(len(self), np.bool_)
+        below = np.uint64(2**64 * number // len(self))
+        run_slices(_choose, len(self), self.xyz.view(np.uint64), below, chosen, size=65536)
+        return np.flatnonzero(chosen)
+
     def evenly_sampled(self, number: int) -> np.ndarray:
         """Return about `number` places, evenly sampled over the tree, whatever the order of the input."""
         return np.arange(0, len(self), max(len(self) // number, 1))
@@ -91,6 +106,19 @@ def build_index(xyz: np.ndarray) -> NeighborIndex:
     boxes[0] = 0.0
     _inner_boxes(1 << depth, boxes)
     return NeighborIndex(here[1], here[0], boxes, blocks)
+
+
+@kernel
+def _choose(start, stop, bits, below, chosen):
+    """Choose the points whose coordinates' bits come out low once mixed (splitmix64, doi:10.1145/2660193.2660195)."""
+    for p in range(start, stop):
+        mixed = np.uint64(0)
+        for axis in range(3):
+            mixed = (mixed ^ bits[axis, p]) + np.uint64(0x9E3779B97F4A7C15)
+            mixed = (mixed ^ (mixed >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+            mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+            mixed ^= mixed >> np.uint64(31)
+        chosen[p] = mixed < below
 
 
 def _axes(count: int) -> np.ndarray:

@@ -15,6 +15,7 @@ DEPTH = 3.0  # spacings behind the nearest point of its pixel within which a poi
 _REACH = 2  # pixels: what is beside an outline lies as near as that
 _GAP = 3.0  # spacings: least gap among the depths around an outline point
 _FAR = 2 * _REACH + 1  # least number of depths beyond the gap
+_STEPS = 2  # in which the size of a pixel doubles
 _MOST_PIXELS = 50  # for each point
 
 
@@ -89,14 +90,18 @@ class _Raster:
 
 
 def _rastered(xyz: np.ndarray, direction: np.ndarray) -> _Raster | None:
-    """Project points along a direction, as many pixels as points where there are any; None if they spread too thin."""
+    """Project points along a direction, about as many pixels as points where any are; None if they spread too thin.
+
+    Pixels have a size in whole steps and fixed corners: what is far away must not matter.
+    """
     right, down, forward = viewer_axes(direction, np.array([0.0, 0.0, 1.0]))
-    centred = xyz - xyz.mean(axis=0)  # far from the origin the picture would lose its digits
-    picture, depth = centred @ np.column_stack([right, down]), centred @ forward
+    picture, depth = xyz @ np.column_stack([right, down]), xyz @ forward
     size = float(np.sqrt(covered_area(picture) / len(picture)))
+    size = 2.0 ** (round(_STEPS * np.log2(size)) / _STEPS) if size > 0 else 0.0
     if not size > 0 or (np.ptp(picture, axis=0) / size + 1).prod() > _MOST_PIXELS * len(xyz) + 10_000:
         return None
-    col, row = (np.floor((picture - picture.min(axis=0)) / size + 0.5).astype(np.int64) + _REACH).T
+    pixel = np.floor(picture / size + 0.5)
+    col, row = (pixel - pixel.min(axis=0) + _REACH).astype(np.int64).T
     nearest = np.full((row.max() + 1 + _REACH, col.max() + 1 + _REACH), np.inf)
     np.minimum.at(nearest, (row, col), depth)
     return _Raster(row, col, depth, nearest, size)

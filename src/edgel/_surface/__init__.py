@@ -5,8 +5,9 @@ that makes an edge likely, the neighbours are asked too.
 """
 
 from edgel._surface.classify import Classification, classify
+from edgel._surface.line import Strengths
 from edgel._surface.screen import screen
 from edgel._surface.statistics import cloud_statistics
 from edgel._surface.surface import Surface
 
-__all__ = ["Classification", "Surface", "classify", "cloud_statistics", "screen"]
+__all__ = ["Classification", "Strengths", "Surface", "classify", "cloud_statistics", "screen"]

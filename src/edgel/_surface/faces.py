@@ -17,7 +17,7 @@ from edgel._surface.evidence import MAX_AWAY, MIN_TURN
 
 def localize(
     index: NeighborIndex,
-    xyz: np.ndarray,
+    smoothed: NeighborIndex,
     edge: np.ndarray,
     planes: Normals,
     num_neighbors: int,
@@ -30,9 +30,8 @@ def localize(
 
     Parameters
     ----------
-    index : NeighborIndex
-    xyz : (N, 3) float64
-        All points.
+    index, smoothed : NeighborIndex
+        All points, and where they were looked at.
     edge : (E,) int64
         The edge points, ascending.
     planes : Normals
@@ -53,10 +52,10 @@ def localize(
     Faces
         One row an edge point; where neither crease nor end is known the position is the point itself.
     """
-    faces = Faces.of_points(xyz[edge], planes.normals)
+    faces = Faces.of_points(index.by_point()[edge], planes.normals)
     noise = np.sqrt(planes.residual / max(num_neighbors - 3, 1))
     _put_rims(faces, index, edge, planes, noise, ends, outermost)
-    found = crease_faces(refined(index, creases), xyz[creases.points], viewpoint)
+    found = crease_faces(refined(smoothed, creases), smoothed.by_point()[creases.points], viewpoint)
     known = creases.evidence.placed & (found.convex != 0)
     faces.put(np.searchsorted(edge, creases.points[known]), found, known)
     return faces

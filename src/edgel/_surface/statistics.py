@@ -20,26 +20,28 @@ FEATURES = {
     "nearest_50": "its median",
     "roundness_50": "median of `roundness` at the smallest scale",
 }
-_SAMPLE = 8_000  # points that the quantiles are taken of
+STEPS = np.array([2.0, 2.0, 1.0, 2.0, 2.0, 0.2, 0.1, 0.1])
+"""What each is rounded to: no answer shall hang on which points were sampled, or on what lies far away."""
+_SAMPLE = 16_000  # points that the quantiles are taken of
 _SPANS = 1e-10  # roundness below which neighbours lie on a line
 _LARGEST = len(OF_SCALE) * (len(SCALES) - 1)  # first column of the largest scale
 _NEAREST = len(OF_SCALE) * len(SCALES)
 
 
 def cloud_statistics(index: NeighborIndex) -> np.ndarray:
-    """Take quantiles of the cheap evidence over evenly sampled points of a cloud.
+    """Take quantiles of the cheap evidence over a cloud, at places chosen by their coordinates alone.
 
     Returns
     -------
     (8,) float32
-        `FEATURES`.
+        `FEATURES`, in whole `STEPS`.
 
     Raises
     ------
     ValueError
         If no neighbourhood spans a plane.
     """
-    features = describe_places(index, index.evenly_sampled(_SAMPLE))
+    features = describe_places(index, index.sampled(_SAMPLE))
     if not (features[:, _LARGEST + ROUNDNESS] > _SPANS).any():
         raise ValueError("points: all lie on one line or spot, so there is no surface whose edges could be found")
     bent, noise, nearest, roundness = (features[:, i] for i in (_LARGEST + VARIATION, VARIATION, _NEAREST, ROUNDNESS))
@@ -49,7 +51,7 @@ def cloud_statistics(index: NeighborIndex) -> np.ndarray:
         np.quantile(nearest, [0.1, 0.5]),
         np.quantile(roundness, [0.5]),
     ]
-    return np.concatenate(quantiles).astype(np.float32)
+    return (np.round(np.concatenate(quantiles) / STEPS) * STEPS).astype(np.float32)
 
 
 def describe_places(index: NeighborIndex, places: np.ndarray) -> np.ndarray:

@@ -13,7 +13,9 @@ from edgel._neighbors.queries import at_points
 from edgel._stages import Stages
 from edgel._surface.classify import Classification, classify
 from edgel._surface.faces import localize
+from edgel._surface.line import Strengths, strengths
 from edgel._surface.screen import Screening, screen
+from edgel._surface.smoothing import smoothed
 from edgel._surface.statistics import cloud_statistics
 from edgel.edges import OUTLINES, EdgeKind
 
@@ -40,18 +42,37 @@ class Surface:
             return build_index(self.xyz)
 
     @cached_property
+    def smoothed(self) -> NeighborIndex:
+        """The tree over the points where the detector looks at them: moved as far as the noise asks for."""
+        index = self.index
+        with self._stages("smoothing"):
+            return smoothed(index)
+
+    @cached_property
     def screening(self) -> Screening:
         """Where an edge could be."""
-        index = self.index
+        index = self.smoothed
         with self._stages("screening"):
             return screen(index, cloud_statistics(index))
+
+    @property
+    def normals(self) -> np.ndarray:
+        """Normals of the screening's middle scale by point, (N, 3) float64; NaN where there is none."""
+        return self.screening.normals_of_points(self.smoothed)
 
     @cached_property
     def classified(self) -> Classification:
         """How likely an edge is there."""
-        index, screening = self.index, self.screening
+        index, screening = self.smoothed, self.screening
         with self._stages("classification"):
             return classify(index, screening)
+
+    @cached_property
+    def strengths(self) -> Strengths:
+        """How marked the edges are there."""
+        index, found = self.smoothed, self.classified
+        with self._stages("classification"):
+            return Strengths(found.points, *(strengths(index, found.points, p) for p in (found.crease, found.outline)))
 
     def faces(self, edge: np.ndarray, kind: np.ndarray, num_neighbors: int, viewpoint: np.ndarray | None) -> Faces:
         """Say where the edge runs at points (E,), ascending, of kinds (E,), and how the surface lies on either side.
@@ -63,4 +84,4 @@ class Surface:
         creases = self.classified.take(np.isin(self.classified.points, edge[(kind & EdgeKind.CREASE) > 0]))
         ends = (kind & OUTLINES) > 0
         outermost = self.classified.points[self.classified.outline > SURE]
-        return localize(self.index, self.xyz, edge, planes, num_neighbors, creases, ends, outermost, viewpoint)
+        return localize(self.index, self.smoothed, edge, planes, num_neighbors, creases, ends, outermost, viewpoint)

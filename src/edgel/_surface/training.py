@@ -12,6 +12,7 @@ from edgel._surface.evidence import Evidence, gather_evidence, with_context
 from edgel._surface.forest import Forest
 from edgel._surface.leaves import describe_leaves
 from edgel._surface.screen import Screening, screen
+from edgel._surface.smoothing import smoothed
 from edgel._surface.statistics import cloud_statistics, describe_places
 
 
@@ -39,7 +40,7 @@ class ScreeningFeatures:
 
 def screening_features(xyz: np.ndarray, asked: np.ndarray) -> ScreeningFeatures:
     """Describe all leaves of a cloud (N, 3), and the points asked for, (N,) bool."""
-    index = build_index(np.ascontiguousarray(xyz))
+    index = smoothed(build_index(np.ascontiguousarray(xyz)))
     values = cloud_statistics(index)
     places = np.flatnonzero(asked[index.order])
     leaf = np.empty(len(index), np.int64)
@@ -74,16 +75,16 @@ class ScreenedCloud:
 
 def screen_cloud(xyz: np.ndarray, forests: Mapping[str, Forest]) -> ScreenedCloud:
     """Screen a cloud (N, 3) with the forests "leaf" and "screen"."""
-    index = build_index(np.ascontiguousarray(xyz))
+    index = smoothed(build_index(np.ascontiguousarray(xyz)))
     return ScreenedCloud(index, screen(index, cloud_statistics(index), forests))
 
 
 def add_context(
     xyz: np.ndarray, points: np.ndarray, evidence: Evidence, crease: np.ndarray, outline: np.ndarray
 ) -> np.ndarray:
-    """Add to the evidence of some points (M,) of a cloud, in the order of its index, what their context says.
+    """Add to the evidence of some points (M,), in the order of the index, what their context says.
 
-    See `edgel._surface.evidence.with_context`.
+    Takes the coordinates (N, 3) of the index, smoothed where the cloud was; see `edgel._surface.evidence.with_context`.
     """
     index = build_index(np.ascontiguousarray(xyz))
     place = np.empty(len(index), np.int64)

@@ -1,0 +1,95 @@
+"""Where the line is drawn between edges and none: from probabilities to strengths, by what the cloud itself says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from edgel._kernels.parallel import kernel
+from edgel._kernels.union_find import find_root
+from edgel._neighbors.kdtree import NeighborIndex
+from edgel._neighbors.knn import knn
+from edgel._neighbors.queries import at_points
+
+EVEN = (0.2, 0.5)  # probability that is as likely as not an edge's: least, on the vaguest cloud, and most
+SURE = 0.44  # where it lies on a cloud whose edges are plain; above it a point needs no other
+STRONG = 0.4  # what a chain of fainter points has to hold
+VAGUE = (0.2, 0.3)  # where it lies in that range, faint points come one abreast the more, the nearer to the end
+_STEP = 0.02  # what it is rounded to: no answer shall hang on what lies far away
+_NEAREST = 9  # points among which the likeliest is looked for, and which link to a chain, the point among them
+
+
+@dataclass(frozen=True, eq=False)
+class Strengths:
+    """How marked the edges are at some points (M,), ascending; one half is as likely as not.
+
+    Attributes
+    ----------
+    points : (M,) int64
+    crease, outline : (M,) float64
+    """
+
+    points: np.ndarray
+    crease: np.ndarray
+    outline: np.ndarray
+
+
+def strengths(index: NeighborIndex, points: np.ndarray, probability: np.ndarray) -> np.ndarray:
+    """Turn the probabilities (M,) of one kind of edge at some points (M,) into strengths (M,).
+
+    Where edges are plain, strength one half lies where the expected F1 is greatest. Where noise or softness leave few
+    points sure it lies lower, and what is below `SURE` has to show that it belongs to an edge, as in Canny's second
+    half: by a chain that holds a strong point, and by being the likeliest among its nearest. On the vaguest clouds,
+    where no one can say which of the points abreast is the edge's, all of them count.
+    """
+    even = even_probability(probability)
+    if even >= SURE:
+        return strength_of(probability, even)
+    strength = strength_of(probability, SURE)
+    on = np.flatnonzero(probability >= even)
+    nearest = knn(index, at_points(index, points[on]), min(_NEAREST, len(index))).points
+    everywhere, row = np.zeros(len(index)), np.full(len(index), -1)
+    everywhere[points], row[points[on]] = probability, np.arange(len(on))
+    chained = np.empty(len(on), np.bool_)
+    _chain(row[nearest], probability[on] >= STRONG, chained)
+    share = np.clip((even - VAGUE[0]) / (VAGUE[1] - VAGUE[0]), 0.0, 1.0)
+    likeliest = probability[on] >= everywhere[nearest].max(axis=1)
+    shown = on[chained & (likeliest | (probability[on] >= even + share * (SURE - even)))]
+    strength[shown] = strength_of(probability[shown], even)
+    return strength
+
+
+def even_probability(probability: np.ndarray) -> float:
+    """Return the probability that is as likely as not an edge's: half of the greatest expected F1, within `EVEN`.
+
+    Lipton et al. 2014, doi:10.1007/978-3-662-44851-9_15: near one half where edges are plain, lower where noise leaves
+    none of them sure. Where it would be lower than that there are no edges to speak of, and what is found has to be as
+    sure as elsewhere.
+    """
+    falling = np.sort(probability)[::-1]
+    expected = np.cumsum(falling) / (np.arange(1, len(falling) + 1) + falling.sum())
+    even = round(float(expected.max(initial=0.0)) / _STEP) * _STEP
+    return min(even, EVEN[1]) if even >= EVEN[0] else SURE
+
+
+def strength_of(probability: np.ndarray, even: float) -> np.ndarray:
+    """Turn probabilities into strengths, `even` into one half; odds keep their ratio."""
+    return probability * (1 - even) / (probability * (1 - even) + even * (1 - probability))
+
+
+@kernel
+def _chain(nearest, strong, chained):
+    """Tell which of some points (M,) are linked to a strong one by their nearest (M, k), -1 for others."""
+    parents = np.arange(len(nearest))
+    for row in range(len(nearest)):
+        for other in nearest[row]:
+            if other >= 0:
+                a, b = find_root(parents, row), find_root(parents, other)
+                parents[max(a, b)] = min(a, b)
+    chained[:] = False
+    for row in range(len(nearest)):
+        if strong[row]:
+            chained[find_root(parents, row)] = True
+    for row in range(len(nearest)):
+        chained[row] = chained[find_root(parents, row)]

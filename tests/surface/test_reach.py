@@ -1,0 +1,68 @@
+"""What is far from a point changes nothing, or next to nothing, that is said of it."""
+
+import numpy as np
+import pytest
+
+import edgel
+from edgel import synth
+from edgel._neighbors.kdtree import build_index
+from edgel._surface import classify, cloud_statistics, screen
+from edgel._surface.forest import Forest, load_forests
+from edgel._surface.reach import evidence_reach
+
+ALL_LEAVES = Forest(np.zeros(1, np.int32), np.full(1, -1, np.int16), np.full(1, 9, np.float32), np.zeros(1, np.int32))
+
+
+def probabilities(index, statistics):
+    """Crease and outline by point, (N, 2); 0 where no one looked."""
+    found = classify(index, screen(index, statistics, {**load_forests(), "leaf": ALL_LEAVES}))
+    said = np.zeros((len(index), 2))
+    said[found.points] = np.column_stack([found.crease, found.outline])
+    return said
+
+
+def test_what_is_out_of_reach_changes_nothing():
+    scene = synth.sample(synth.wedge_fan(), pattern="uniform", spacing=1.9, noise=0.1, outliers=0.01, seed=4)
+    xyz = scene.cloud.xyz
+    cut = np.quantile(xyz[:, 0], 0.7)
+    tile = np.ascontiguousarray(xyz[xyz[:, 0] < cut])
+    whole, part = build_index(xyz), build_index(tile)
+    statistics = cloud_statistics(whole)
+    reach = np.empty(len(tile))
+    reach[part.order] = evidence_reach(part)
+    sure = reach < cut - tile[:, 0]  # told by the tile alone
+    assert sure.mean() > 0.4
+    assert np.median(reach) < 25 * scene.spacing
+    expected, said = probabilities(whole, statistics)[xyz[:, 0] < cut], probabilities(part, statistics)
+    np.testing.assert_array_equal(said[sure], expected[sure])
+    assert (said[sure] > 0.5).any()
+    assert (said != expected).any()  # near the cut it is another surface
+
+
+@pytest.fixture(scope="module")
+def houses():
+    """Flat and gabled roofs over uneven ground, seen from above, with trees."""
+    rng = np.random.default_rng(1)
+    grid = np.stack(np.meshgrid(np.arange(150.0), np.arange(150.0)), axis=-1).reshape(-1, 2)
+    plan = grid + rng.uniform(-0.45, 0.45, grid.shape)
+    x, y = plan.T
+    height = 2 * np.sin(x / 40) * np.cos(y / 30)
+    u, v = np.abs(x % 38 - 19), np.abs(y % 30 - 15)
+    roof, crown = (u < 11) & (v < 8), np.hypot(u - 19, v - 15) < 5
+    height = np.where(roof, 9 + np.where(x % 76 < 38, 0, 8 - v) * 0.7, height)
+    height += np.where(crown, rng.uniform(3, 9, len(plan)), 0)
+    return np.column_stack([plan, height]) + 0.05 * rng.standard_normal((len(plan), 3))
+
+
+def test_a_strip_left_out_changes_edges_beside_it_alone(houses):
+    whole = edgel.detect(houses)
+    assert (whole.kind & edgel.EdgeKind.OCCLUDING).any()
+    for axis, rising in ((0, True), (1, False)):
+        along = houses[:, axis] if rising else -houses[:, axis]
+        kept = np.flatnonzero(along > np.quantile(along, 0.01))
+        kinds, again = np.zeros((2, len(houses)), np.uint8)
+        kinds[whole.index] = whole.kind
+        part = edgel.detect(houses[kept])
+        again[kept[part.index]] = part.kind
+        far = along > np.quantile(along, 0.01) + 40
+        assert np.sum((kinds != again)[far]) <= 0.002 * np.sum(kinds[far] > 0)
