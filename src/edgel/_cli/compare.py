@@ -97,10 +97,11 @@ def _extended_records(cloud: Cloud, kept: Cloud) -> list[str]:
 def _attribute(name: str, values: np.ndarray, kept: Cloud, names: Collection[str]) -> list[str]:
     """Say what of an attribute a copy has not kept; `names` are those of all attributes of the original."""
     columns = as_table(values)
-    if name in kept.attributes:
+    split = [f"{name}_{i}" for i in range(columns.shape[1] if values.ndim > 1 else 0)]
+    if split and not set(split) - set(kept.attributes):
+        parts = [kept.attributes[part] for part in split]
+    elif name in kept.attributes:
         parts = [kept.attributes[name]]
-    elif values.ndim > 1 and all(f"{name}_{i}" in kept.attributes for i in range(columns.shape[1])):
-        parts = [kept.attributes[f"{name}_{i}"] for i in range(columns.shape[1])]
     elif f"{name}_exact" in kept.attributes:
         parts = [kept.attributes[f"{name}_exact"]]
     else:

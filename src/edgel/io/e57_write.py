@@ -102,8 +102,8 @@ def _uninterrupted() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():  # no other thread is ever interrupted
         yield
         return
-    held: list[tuple[int, Any]] = []
-    usual = {number: signal.getsignal(number) for number in signal.valid_signals()}
+    held: list[Any] = []
+    usual: dict[int, Any] = {number: signal.getsignal(number) for number in signal.valid_signals()}
     usual = {number: handler for number, handler in usual.items() if callable(handler)}  # not ignored, nor the system's
     for number in usual:
         signal.signal(number, lambda *arguments: held.append(arguments))

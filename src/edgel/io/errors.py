@@ -55,7 +55,8 @@ class FormatWarning(UserWarning):
     Attributes
     ----------
     said : mapping of str to str
-        What became of it, by the name of the attribute, or ``coordinates``: left out, renamed, rounded, and why.
+        What became of it: left out, renamed, rounded, and why; by the name of the attribute (of one of its columns
+        ``name_0`` where it is split), or ``coordinates``.
 
     Examples
     --------

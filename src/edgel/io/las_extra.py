@@ -31,7 +31,7 @@ def declare_as_given(header: laspy.LasHeader, extra: laspy.DimensionInfo, attrib
     """Declare an extra dimension as the file had it, if the cloud still has it as the file gave it."""
     word = "_".join(extra.name.split())  # as flat_attributes spells it
     values = attributes.get(word)
-    if values is None or extra.dtype is None:
+    if values is None or extra.dtype is None or ":" in extra.name:
         return
     scaled = extra.scales is not None or extra.offsets is not None
     as_given = _on_grid(values, extra) if scaled else values.dtype == extra.dtype.base
@@ -101,7 +101,7 @@ def _types(column: np.ndarray) -> list[str]:
 
 def _dimension_name(word: str, used: set[str], taken: set[str], *, exact: bool) -> str:
     """Return a name that neither the points have yet nor LAS takes for something else, of 32 bytes at most."""
-    stem = f"{word}_exact" if exact else word
+    stem = (f"{word}_exact" if exact else word).replace(":", "_")  # NumPy gives out no buffer with a colon in a name
     new = free_name(_cut(stem), used, taken)
     return new if len(new.encode()) <= _ROOM else free_name(_cut(stem, _ROOM - 4), used, taken)
 

@@ -35,10 +35,10 @@ def read(path: str | os.PathLike[str] | BinaryIO) -> Cloud:
     Returns
     -------
     Cloud
-        All scalar vertex properties as (N,) attributes of their own type, without CloudCompare's prefix ``scalar_`` as
-        long as that makes no name twice; list properties, faces and other elements are
-        left out, and named in ``metadata["left_out"]``. ``obj_info num_cols`` and ``num_rows`` make the cloud
-        organized; where Stanford's ``range_grid`` lists only the valid points, the other cells are NaN.
+        All scalar vertex properties as (N,) attributes of their own type and name, but for the prefix of `write`; list
+        properties, faces and other elements are left out, and named in ``metadata["left_out"]``. ``obj_info num_cols``
+        and ``num_rows`` make the cloud organized; where Stanford's ``range_grid`` lists only the valid points, the
+        other cells are NaN.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def _read(path: str, file: BinaryIO) -> Cloud:
     _check_size(path, header, vertex, file)
     read_body = _read_ascii if header.ascii else _read_binary
     xyz, attributes = read_body(path, file, header, header.elements[:position], vertex, axes)
-    cloud = _to_cloud(path, header, xyz, _without_prefix(attributes))
+    cloud = _to_cloud(path, header, xyz, _without_prefix(header, attributes))
     grid = range_grid(header)
     if cloud.shape is None and grid is not None:
         position, shape = grid
@@ -159,9 +159,10 @@ def _read_with_lists(path: str, file: BinaryIO, header: Header, vertex: Element)
     }
 
 
-def _without_prefix(attributes: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Take off CloudCompare's prefix; all names stay as they are where one would be there twice, or a coordinate's."""
-    bare = {name.removeprefix(PREFIX) or name: values for name, values in attributes.items()}
+def _without_prefix(header: Header, attributes: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Take off the prefix that `write` has put before names; all stay as they are where one would be there twice."""
+    prefix = header.info.get("prefix", "")
+    bare = {name.removeprefix(prefix) or name: values for name, values in attributes.items()}
     clash = len(bare) < len(attributes) or any(name.lower() in ("x", "y", "z") for name in bare)
     return attributes if clash else bare
 
@@ -196,10 +197,10 @@ def write(path: str | os.PathLike[str] | BinaryIO, cloud: Cloud) -> None:
 
     Coordinates become float when that is exact for all of them, else double. Other programs know normals ``nx ny nz``,
     colors and ``intensity`` by name; attributes of any other name get CloudCompare's prefix ``scalar_``, without which
-    it does not load them, and which `read` takes off. The types are those that Open3D reads: the smallest of uchar,
-    int, float and double that holds every value exactly, no smaller than the attribute's own. (N, C) attributes become
-    ``name_0 .. name_{C-1}``. Organized shape (``num_cols``, ``num_rows``, the Stanford convention), viewpoint and CRS
-    go into ``obj_info`` lines.
+    it does not load them; ``obj_info prefix`` says so, and `read` takes it off again. The types are those that Open3D
+    reads: the smallest of uchar, int, float and double that holds every value exactly, no smaller than the attribute's
+    own. (N, C) attributes become ``name_0 .. name_{C-1}``. Organized shape (``num_cols``, ``num_rows``, the Stanford
+    convention), viewpoint and CRS go into ``obj_info`` lines.
 
     Parameters
     ----------
@@ -265,6 +266,8 @@ def _header_text(cloud: Cloud, types: dict[str, str]) -> str:
         lines.append("obj_info viewpoint " + " ".join(map(repr, cloud.viewpoint.tolist())))
     if cloud.crs:
         lines.append(f"obj_info crs {one_line(cloud.crs)}")
+    if any(name.startswith(PREFIX) for name in types):
+        lines.append(f"obj_info prefix {PREFIX}")
     lines.append(f"element vertex {len(cloud)}")
     lines += [f"property {NAMES[code]} {name}" for name, code in types.items()]
     return "\n".join([*lines, "end_header", ""])

@@ -59,7 +59,7 @@ def write(path: str | os.PathLike[str], cloud: Cloud) -> None:
     columns = dict(zip("xyz", cloud.xyz.T, strict=True)) | columns
     header = separator.join(columns) + "\n"
     if suffix == ".pts":
-        header = f"{len(cloud)}\n"
+        header = f"{len(cloud)}\n" if len(cloud) else f"0\n# {header}"
     elif suffix != ".csv" and len(columns) == 3 and len(cloud):
         header = ""
     tell(os.fspath(path), said)
