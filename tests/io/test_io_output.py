@@ -170,6 +170,7 @@ def test_a_device_is_never_removed(tmp_path, suffix):
 
 
 @pytest.mark.usefixtures("needs")
+@pytest.mark.filterwarnings("ignore::edgel.FormatWarning")  # PTS has no place for them
 @pytest.mark.parametrize("suffix", WRITERS)
 def test_an_empty_cloud_with_vectors(tmp_path, suffix):
     vectors = {"normal": np.empty((0, 3), np.float32), "id": np.empty(0, np.uint64), "nothing": np.empty((0, 0))}

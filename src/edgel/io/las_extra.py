@@ -81,9 +81,10 @@ def fit_dimensions(
             continue
         room -= size
         for part, single in stored.items():
-            dimension = _dimension_name(part, {*values, *known}, taken, exact=part in known)
+            used = {*values, *known, *(set(attributes) - {part})}
+            dimension = _dimension_name(part, used, taken, exact=part in known)
             if dimension != part:
-                what = "whose own values have other bounds" if part in known else "to suit LAS"
+                what = f"{part} of LAS cannot hold its values" if part in known else "to suit LAS"
                 said[part] = f"renamed {dimension}, {what}"
             values[dimension] = single  # pyright: ignore[reportArgumentType]
             description = _cut(_DESCRIPTIONS.get(part, part))

@@ -23,6 +23,7 @@ _PCL_TYPES = {"intensity": "f4", "label": "u4", "curvature": "f4"}
 _TAKEN = ("x", "y", "z", "rgb", "rgba", "_")
 # Half a millimetre is lost by single precision at ten kilometres; CloudCompare offers a shift from there on too.
 _LARGE = 1e4
+_HUGE = 2.0**53  # whole numbers are exact up to there
 
 
 def write(path: str | os.PathLike[str], cloud: Cloud) -> None:
@@ -85,13 +86,14 @@ def _coordinates(cloud: Cloud, said: dict[str, str]) -> tuple[np.ndarray, np.nda
         return cloud.xyz, None, "<f4"
     finite = cloud.xyz[np.isfinite(cloud.xyz).all(axis=1)]
     low, high = (finite.min(axis=0), finite.max(axis=0)) if len(finite) else (np.zeros(3), np.zeros(3))
-    shift = np.where(np.maximum(-low, high) > _LARGE, np.rint(low / 200 + high / 200) * 100, 0.0)
+    most = np.maximum(-low, high)
+    shift = np.where((most > _LARGE) & (most < _HUGE), np.rint(low / 200 + high / 200) * 100, 0.0)
     given = cloud.metadata.get("pcd_shift")
     if given is not None and np.maximum(np.abs(low - given), np.abs(high - given)).max() <= _LARGE:
         shift = np.array(given, np.float64)  # as it was: the same coordinates have the same bytes
     xyz, shift = (cloud.xyz - shift, shift) if shift.any() else (cloud.xyz, None)
     most = float(np.abs([low, high] if shift is None else [low - shift, high - shift]).max())
-    if most > np.finfo(np.float32).max:
+    if most > float(np.finfo(np.float32).max):
         said["coordinates"] = "written in double precision, beyond the range of the single one that PCL reads"
         return cloud.xyz, None, "<f8"
     rounded = f"rounded to single precision, as PCL reads it, by {np.spacing(np.float32(most)) / 2:.1g} at most"
