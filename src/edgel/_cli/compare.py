@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+import warnings
 from collections.abc import Collection
 from pathlib import Path
 from typing import Any
@@ -28,7 +29,9 @@ def read_copy(output: str, cloud: Cloud) -> Cloud:
 
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / ("stdout.ply" if output == files.PIPE else Path(output).name)
-        io.write(copy, cloud)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", io.FormatWarning)  # the comparison tells the same
+            io.write(copy, cloud)
         return io.read(copy)
 
 
