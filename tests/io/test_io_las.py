@@ -76,7 +76,7 @@ def test_any_cloud_round_trips(tmp_path_factory, cloud, suffix):
         warnings.simplefilter("always")
         write(file, cloud)
     found = read(file)
-    said = caught[0].message.said if caught else {}
+    said = getattr(caught[0].message, "said", {}) if caught else {}
     assert set(said) == {name for name in ("intensity",) if f"{name}_exact" in found.attributes}
     extent = np.ptp(cloud.xyz, axis=0)
     # The finest power of ten for which the extent fits 31 bits: half a step is lost at most.
@@ -146,7 +146,7 @@ def test_names_that_las_cannot_have_are_renamed_and_said(tmp_path, name):
         write(tmp_path / "a.las", cloud)
     found = read(tmp_path / "a.las")
     (new,) = [key for key, values in found.attributes.items() if values.tolist() == [7, 2**60 + 1, 9]]
-    assert caught[0].message.said[name].startswith(f"renamed {new}")
+    assert getattr(caught[0].message, "said", {})[name].startswith(f"renamed {new}")
     np.testing.assert_array_equal(found.attributes[name[:1] * 32], np.arange(3))
     assert len(new.encode()) <= 32
 
