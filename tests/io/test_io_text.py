@@ -21,7 +21,7 @@ def read_text(tmp_path, text, suffix=".txt"):
 
 
 @settings(max_examples=60)
-@given(clouds(), st.sampled_from(SUFFIXES))
+@given(clouds(), st.sampled_from([suffix for suffix in SUFFIXES if suffix != ".pts"]))
 def test_round_trip(tmp_path_factory, cloud, suffix):
     file = tmp_path_factory.mktemp("text") / f"a{suffix}"
     write(file, cloud)
@@ -30,6 +30,8 @@ def test_round_trip(tmp_path_factory, cloud, suffix):
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_round_trip_of_a_rich_cloud(tmp_path, suffix):
+    if suffix == ".pts":
+        pytest.skip("PTS holds intensity and colors only")
     cloud = rich_cloud(holes=True)
     write(tmp_path / f"a{suffix}", cloud)
     found = read(tmp_path / f"a{suffix}")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import tempfile
+import warnings
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +29,9 @@ def read_copy(output: str, cloud: Cloud) -> Cloud:
 
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / ("stdout.ply" if output == files.PIPE else Path(output).name)
-        io.write(copy, cloud)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", io.FormatWarning)  # the comparison tells the same
+            io.write(copy, cloud)
         return io.read(copy)
 
 
@@ -69,35 +73,56 @@ def differences(cloud: Cloud, kept: Cloud) -> list[str]:
     lost = []
     if len(kept) != len(cloud):
         return [f"points: {count(len(kept))} of {count(len(cloud))}"]
-    same = np.isnan(kept.xyz) & np.isnan(cloud.xyz) | (kept.xyz == cloud.xyz)
+    with np.errstate(invalid="ignore"):
+        close = np.abs(kept.xyz - cloud.xyz) <= 4 * np.spacing(np.abs(cloud.xyz))  # decimals of a LAS grid, as doubles
+    same = np.isnan(kept.xyz) & np.isnan(cloud.xyz) | (kept.xyz == cloud.xyz) | close
     if not same.all():
         shift = np.abs(kept.xyz - cloud.xyz)[~same].max()
         lost.append(f"coordinates: rounded, by {length(float(shift))} at most" if np.isfinite(shift) else "coordinates")
     for name, values in cloud.attributes.items():
-        lost += _attribute(name, values, kept)
+        lost += _attribute(name, values, kept, cloud.attributes)
     for name in ("shape", "viewpoint", "crs"):
         if getattr(cloud, name) is not None and getattr(kept, name) is None:
             lost.append({"shape": "organized rows and columns"}.get(name, name) + ": left out")
-    return lost + [f"{what}: left out" for what in cloud.metadata.get("left_out", ())]
+    left_out = [*cloud.metadata.get("left_out", ()), *_extended_records(cloud, kept)]
+    return lost + [f"{what}: left out" for what in left_out]
 
 
-def _attribute(name: str, values: np.ndarray, kept: Cloud) -> list[str]:
+def _extended_records(cloud: Cloud, kept: Cloud) -> list[str]:
+    """Name the extended records (EVLR) of a LAS file that a copy has not, but for COPC's, which order its points."""
+    found, copies = (
+        [(evlr.user_id, evlr.record_id) for evlr in getattr(c.metadata.get("las_header"), "evlrs", None) or ()]
+        for c in (cloud, kept)
+    )
+    return [f"extended record (EVLR) {user} {number}" for user, number in found if (user, number) not in copies]
+
+
+def _attribute(name: str, values: np.ndarray, kept: Cloud, names: Collection[str]) -> list[str]:
+    """Say what of an attribute a copy has not kept; `names` are those of all attributes of the original."""
     columns = as_table(values)
-    if name in kept.attributes:
+    split = [f"{name}_{i}" for i in range(columns.shape[1] if values.ndim > 1 else 0)]
+    if split and not set(split) - set(kept.attributes):
+        parts = [kept.attributes[part] for part in split]
+    elif name in kept.attributes:
         parts = [kept.attributes[name]]
-    elif values.ndim > 1 and all(f"{name}_{i}" in kept.attributes for i in range(columns.shape[1])):
-        parts = [kept.attributes[f"{name}_{i}"] for i in range(columns.shape[1])]
     elif f"{name}_exact" in kept.attributes:
         parts = [kept.attributes[f"{name}_exact"]]
     else:
-        return [f"{name}: left out"]
+        others = (
+            other for other in kept.attributes if other not in names and _same_column(kept.attributes[other], values)
+        )
+        other = next(others, None)
+        return [f"{name}: left out" if other is None else f"{name}: renamed {other}"]
     copy = np.column_stack([as_table(part) for part in parts])
-    numbers = values.dtype.kind == "f" and copy.dtype.kind == "f"
-    if copy.shape != columns.shape or not np.array_equal(copy, columns, equal_nan=numbers):
+    if copy.shape != columns.shape or not _same_column(copy, columns):
         return [f"{name}: values changed"]
     if len(parts) > 1:
         return [f"{name}: split into {name}_0 to {name}_{len(parts) - 1}"]
     return []
+
+
+def _same_column(copy: np.ndarray, values: np.ndarray) -> bool:
+    return np.array_equal(copy, values, equal_nan=values.dtype.kind == "f" and copy.dtype.kind == "f")
 
 
 def _same(value: Any, other: Any) -> bool:

@@ -6,11 +6,13 @@ import os
 import stat
 import sys
 import tempfile
+import warnings
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from edgel._cli.errors import ExitCode, Failure, failing_as
+from edgel._cli.output import print_line
 from edgel.cloud import Cloud
 
 if TYPE_CHECKING:
@@ -161,10 +163,24 @@ def check_new_folder(path: str, files: re.Pattern[str], *, inputs: Iterable[str 
 
 
 def write_cloud(path: str, cloud: Cloud, *, no_clobber: bool = False) -> None:
-    """Write a cloud, PLY to stdout when the path is ``-``."""
-    from edgel import io
+    """Write a cloud, PLY to stdout when the path is ``-``, and say what the format could not hold."""
+    from edgel.io import FormatWarning
 
     check_clobber(path, no_clobber=no_clobber)  # once more: the work took its time
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", FormatWarning)
+        _write(path, cloud)
+    for warning in caught:
+        if isinstance(warning.message, FormatWarning):
+            for line in warning.message.lines():
+                print_line(f"{'stdout' if path == PIPE else path}: {line}", style="yellow")
+        else:
+            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
+
+
+def _write(path: str, cloud: Cloud) -> None:
+    from edgel import io
+
     if path != PIPE:
         with failing_as(ExitCode.OUTPUT, path):
             io.write(path, cloud)

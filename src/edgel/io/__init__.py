@@ -16,10 +16,10 @@ from edgel._intrinsics import Intrinsics
 from edgel.cloud import Cloud
 from edgel.io import depth, e57, e57_write, npy, pcd, ply, text, text_write
 from edgel.io.depth import read_intrinsics
-from edgel.io.errors import FormatError, printable
+from edgel.io.errors import FormatError, FormatWarning, printable
 from edgel.io.files import check_readable, describe
 
-__all__ = ["READERS", "WRITERS", "FormatError", "Intrinsics", "read", "read_intrinsics", "write"]
+__all__ = ["READERS", "WRITERS", "FormatError", "FormatWarning", "Intrinsics", "read", "read_intrinsics", "write"]
 
 
 def _read_las(path: str | os.PathLike[str]) -> Cloud:
@@ -134,12 +134,18 @@ def write(path: str | os.PathLike[str] | BinaryIO, cloud: Cloud) -> None:
         PLY, PCD, LAS, LAZ, XYZ, TXT, CSV, ASC, PTS, NPY, NPZ or E57. An open binary file (``sys.stdout.buffer``) gets
         PLY.
     cloud : Cloud
-        What each format keeps is said in its module; values are never rounded silently, save to the grid of LAS.
+        What each format keeps is said in its module; values are never rounded silently, save coordinates to the grid of
+        LAS and, below 10,000, to the single precision of PCD.
+
+    Warns
+    -----
+    FormatWarning
+        If an attribute is left out or renamed, or coordinates are shifted or rounded; its ``said`` tells which and why.
 
     Raises
     ------
     FormatError
-        If the extension is unknown, or the format cannot hold the cloud; the message tells the remedy.
+        If the extension is unknown, or the format cannot hold the coordinates; the message tells the remedy.
     OSError
         If the file cannot be written; nothing is left behind.
 
