@@ -35,6 +35,7 @@ _MAGIC: list[tuple[bytes, str, str]] = [
     (rb"glTF", "a glTF model", "it is a mesh, not a point cloud; sample it first"),
     (rb"solid\s", "an STL mesh", "it is a mesh, not a point cloud; sample it first"),
     (rb"\x89MCAP|#ROSBAG", "a ROS recording", "convert its point clouds to PCD first"),
+    (rb"CCB[\d2]", "a CloudCompare project", "save its clouds as PLY or E57"),
     (rb"\x1f\x8b", "gzip-compressed", "unpack it first (gunzip)"),
     (rb"BZh|\xfd7zXZ|\x28\xb5\x2f\xfd|7z\xbc\xaf", "a compressed archive", "unpack it first"),
     (rb"\x89HDF", "an HDF5 file", "convert it to .npz first"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from io import BytesIO, TextIOWrapper
 from itertools import islice
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -14,10 +14,13 @@ from edgel.io.columns import find_xyz, fits_float32, flat_attributes, one_line
 from edgel.io.errors import FormatError
 from edgel.io.files import reading, replacing
 from edgel.io.limits import LONGEST_LINE, whole_number
+from edgel.io.mesh import OFFER
 from edgel.io.ply_grid import range_grid, read_grid, spread
 from edgel.io.ply_header import NAMES, Element, Header, cut_off, read_header
 from edgel.io.ply_lists import gather, skip, walk
 from edgel.io.rows import number_of, parse_text, read_binary, reject_row, remaining_bytes, write_binary
+
+_FACES = ("face", "faces", "tristrips")
 
 
 def read(path: str | os.PathLike[str] | BinaryIO) -> Cloud:
@@ -32,7 +35,8 @@ def read(path: str | os.PathLike[str] | BinaryIO) -> Cloud:
     -------
     Cloud
         All scalar vertex properties as (N,) attributes of their own type; list properties, faces and other elements are
-        left out, and named in ``metadata["left_out"]``. ``obj_info num_cols`` and ``num_rows`` make the cloud
+        left out, and named in ``metadata["left_out"]``; with faces ``metadata["notices"]`` says that it is a mesh.
+        ``obj_info num_cols`` and ``num_rows`` make the cloud
         organized; where Stanford's ``range_grid`` lists only the valid points, the other cells are NaN.
 
     Raises
@@ -164,9 +168,11 @@ def _to_cloud(path: str, header: Header, xyz: np.ndarray, attributes: dict[str, 
         if len(words) != 3 or not all(number_of(word) and np.isfinite(float(word)) for word in words):
             raise FormatError(f"{path}: obj_info viewpoint {' '.join(words)!r}; three finite numbers are needed")
         viewpoint = np.array(words, np.float64)
-    metadata = {"ply_comments": tuple(header.comments)} if header.comments else {}
+    metadata: dict[str, Any] = {"ply_comments": tuple(header.comments)} if header.comments else {}
     if left_out := _left_out(header):
         metadata["left_out"] = left_out
+    if num_faces := sum(e.count for e in header.elements if e.name in _FACES):
+        metadata["notices"] = (f"a mesh of {num_faces:,} faces: its vertices are no scan of it; to {OFFER}",)
     return Cloud(xyz, attributes, shape, viewpoint, header.info.get("crs") or None, metadata)
 
 

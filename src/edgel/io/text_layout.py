@@ -17,6 +17,7 @@ _SAMPLE = 200
 _MOST_COLUMNS = 4096
 _NUMBER = re.compile(r"\d|nan|inf", re.IGNORECASE)
 _HEADER_WORD = re.compile(r"[^\W\d][\w .:()\[\]/-]*")
+_INTRODUCTION = re.compile(r"[\w ]+[:=]\s+")
 _UNIT = re.compile(r"\s*([\[(])\s*([^\])]*?)\s*([\])])")
 _SPREADSHEET = re.compile(r"\"?sep=.\"?", re.IGNORECASE)
 _LEFT_OUT = "_"
@@ -108,7 +109,7 @@ def find_layout(path: str, lines: list[str], columns: Sequence[str] | None = Non
         names = _header(path, words, Layout(first, count, delimiter, sample), quoted)
     if names is None:
         names = _header_among(path, remarks, width, delimiter)
-    unread = {i: f"text in column {names[i] if names else i}" for i in _texts(sample, width)}
+    unread = {i: f"text column {names[i] if names else i + 1}" for i in _texts(sample, width)}
     return Layout(first, count, delimiter, sample, names, unread)
 
 
@@ -171,7 +172,7 @@ def _given(
         )
     names = [f"{_LEFT_OUT}{i}" if name == _LEFT_OUT else name for i, name in enumerate(columns)]
     names += [f"column_{i}" for i in range(len(names), width)]
-    texts = {i: f"text in column {names[i]}" for i in _texts(sample, width)}
+    texts = {i: f"text column {names[i]}" for i in _texts(sample, width)}
     return names, texts | {i: "" for i, name in enumerate(columns) if name == _LEFT_OUT}
 
 
@@ -195,14 +196,14 @@ def _header(path: str, words: list[tuple[int, str]], layout: Layout, quoted: boo
 def _header_among(path: str, remarks: list[str], width: int, delimiter: str | None) -> list[str] | None:
     """Return the names in the last comment that calls all columns by names, x, y and z among them."""
     for remark in reversed(remarks):
-        # "X Y Z", "Columns: X Y Z", "fields X Y Z"
-        for text in (remark, re.split("[:=]", remark, maxsplit=1)[-1], remark.partition(" ")[2]):
+        # "X Y Z" or "Columns: X Y Z"; then "fields X Y Z"
+        for text in (_INTRODUCTION.sub("", remark), remark.partition(" ")[2]):
             names = _split_header(text, delimiter)
             if any(map(number_of, names)) or find_axes(names) is None:
                 continue
             if len(names) == width:
                 return _unique(names)
-            if text is remark and 3 < len(names) < width and find_axes(names) != names[:3]:
+            if 3 < len(names) < width and find_axes(names) != names[:3]:
                 raise FormatError(
                     f"{path}: the comment {remark[:60]!r} names {len(names)} columns, the points have {width}; mend "
                     "it, or name the columns (--columns x,y,z,...)"

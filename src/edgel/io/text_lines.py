@@ -23,6 +23,7 @@ _MISSING = re.compile(
     re.IGNORECASE,
 )
 _INFINITE = re.compile(r"([-+]?)\d\.#inf\w*", re.IGNORECASE)
+_FLAGS = {"true": "1", "false": "0"}
 _FORTRAN = re.compile(r"([-+]?[\d.]+)[dD]([-+]?\d+)")
 
 
@@ -134,7 +135,9 @@ def as_number(token: str) -> str:
         return match[1] + "inf"
     if match := _FORTRAN.fullmatch(token):
         return f"{match[1]}e{match[2]}"
-    plain = token.replace("\u2212", "-")
+    if token.lower() in _FLAGS:
+        return _FLAGS[token.lower()]
+    plain = token.replace("\u2212", "-")  # a minus as it is printed
     return plain.replace(",", ".") if _COMMA_SINCE_FIRST_DIGIT.fullmatch(plain) else plain
 
 
