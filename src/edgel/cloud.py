@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from edgel._kernels.parallel import kernel, run_slices
+from edgel._objects import take_apart
 
 LARGEST = 1e30
 """Largest coordinate, in magnitude: squares of distances stay far from overflow and offsets fit single precision. In
@@ -136,20 +137,16 @@ def as_cloud(points: Any) -> Cloud:
 
     Parameters
     ----------
-    points : Cloud, (N, 3) or (H, W, 3) array_like, or an object with ``.xyz`` or ``.points``
-        Objects of laspy (``.xyz``), Open3D and PyVista (``.points``) are understood.
+    points : Cloud, (N, 3) or (H, W, 3) array_like, records with x, y and z, or an object that carries points
+        See `edgel._objects.take_apart` for the objects of other libraries that are understood; their attributes come
+        along.
 
     Raises
     ------
     TypeError, ValueError
         If it carries no numeric coordinates of shape (N, 3) or (H, W, 3).
     """
-    if isinstance(points, Cloud):
-        return points
-    for attribute in ("xyz", "points"):
-        if not isinstance(points, np.ndarray) and hasattr(points, attribute):
-            return Cloud(unmasked(getattr(points, attribute), "points"))
-    return Cloud(points)
+    return points if isinstance(points, Cloud) else Cloud(*take_apart(points))
 
 
 def check_points(points: Any, *, minimum: int = 3) -> Points:
@@ -166,7 +163,8 @@ def check_points(points: Any, *, minimum: int = 3) -> Points:
     TypeError, ValueError
         If `points` carries no coordinates, or fewer than `minimum` finite ones, or one beyond `LARGEST`.
     """
-    xyz = as_cloud(points).xyz
+    cloud = as_cloud(points)
+    xyz = cloud.xyz
     # The squares sum up to so little only if none is NaN, infinite or too large: one pass, no (N, 3) mask for the usual
     # clean cloud.
     with np.errstate(over="ignore", invalid="ignore"):
@@ -180,11 +178,9 @@ def check_points(points: Any, *, minimum: int = 3) -> Points:
         xyz = xyz if len(rows) == len(xyz) else xyz.take(rows, axis=0)
         _check_size(xyz, rows, "points")
     if len(rows) < minimum:
-        found = (
-            f"{len(rows)} finite points of {len(as_cloud(points))}" if len(rows) < len(as_cloud(points)) else len(rows)
-        )
+        found = f"{len(rows)} finite points of {len(cloud)}" if len(rows) < len(cloud) else len(rows)
         raise ValueError(f"points: needs at least {minimum} points with finite coordinates, got {found}")
-    return Points(np.ascontiguousarray(xyz), rows, len(as_cloud(points)))
+    return Points(np.ascontiguousarray(xyz), rows, len(cloud))
 
 
 @kernel

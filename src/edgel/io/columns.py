@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -12,7 +11,6 @@ from edgel.cloud import Cloud
 from edgel.io.errors import FormatError
 
 COLORS = ["red", "green", "blue"]
-_SHORT_COLORS = dict(zip("rgb", COLORS, strict=True))
 
 
 def flat_attributes(cloud: Cloud, path: object, *, keep_arrays: bool = False) -> dict[str, np.ndarray]:
@@ -58,22 +56,6 @@ def flat_attributes(cloud: Cloud, path: object, *, keep_arrays: bool = False) ->
 def as_table(values: np.ndarray) -> np.ndarray:
     """Return an attribute (N, ...) as (N, C), of no points too."""
     return values.reshape(len(values), math.prod(values.shape[1:]))
-
-
-def find_xyz(names: Iterable[str]) -> list[str] | None:
-    """Return the names of the x, y and z columns (upper or lower case), None when one is missing."""
-    lower: dict[str, str] = {}
-    for name in names:
-        lower.setdefault(name.lower(), name)
-    return [lower[axis] for axis in "xyz"] if all(axis in lower for axis in "xyz") else None
-
-
-def spell_out_colors(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Call columns r, g, b (all three there, any case) red, green and blue, as every other format does."""
-    lower = {name.lower() for name in columns}
-    if not {"r", "g", "b"} <= lower or lower & set(_SHORT_COLORS.values()):
-        return dict(columns)
-    return {_SHORT_COLORS.get(name.lower(), name): values for name, values in columns.items()}
 
 
 def fits_float32(xyz: np.ndarray) -> bool:

@@ -7,7 +7,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from edgel.io.columns import COLORS, find_xyz
+from edgel._objects import find_xyz
+from edgel.io.columns import COLORS
 
 NORMALS = ["nx", "ny", "nz"]
 # What stands around x, y and z: "Points:0", "POINT_X", "X [mm]", "pose.position.x", "x_coord", "X-Koordinate".

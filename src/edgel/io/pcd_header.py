@@ -8,7 +8,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from edgel.io.columns import find_xyz
+from edgel._objects import find_xyz
 from edgel.io.errors import FormatError
 from edgel.io.files import wrong_magic
 from edgel.io.limits import LONGEST_HEADER, whole_number

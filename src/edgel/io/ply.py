@@ -9,8 +9,9 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from edgel._objects import find_xyz
 from edgel.cloud import Cloud
-from edgel.io.columns import find_xyz, fits_float32, flat_attributes, one_line
+from edgel.io.columns import fits_float32, flat_attributes, one_line
 from edgel.io.errors import FormatError
 from edgel.io.files import reading, replacing
 from edgel.io.limits import LONGEST_LINE, whole_number

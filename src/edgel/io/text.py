@@ -38,9 +38,10 @@ def read(path: str | os.PathLike[str], *, columns: str | Sequence[str] | None = 
         colors and normals are ``red green blue`` and ``nx ny nz`` whatever they were called. A comment is the header
         if it names every column. Without a header the first three columns are x, y, z; unit vectors are ``nx ny nz``,
         integers 0..255 at the end (or after z) ``red green blue`` (uint8), a single column beside them is
-        ``intensity``, any others are ``column_3`` onwards. Columns of integers are int64, others float64.
-        What is missing (nothing between two separators or at the end of a line, ``NULL``, ``1.#QNAN``) is NaN. Columns
-        of text are left out, and named in ``metadata["left_out"]``. With several blocks ``scan_index`` tells the block.
+        ``intensity``, any others are ``column_3`` onwards (``text_3`` where they hold words). Columns of integers are
+        int64, others float64. What is missing (nothing between two separators or at the end of a line, ``NULL``,
+        ``1.#QNAN``) is NaN;
+        columns of words become texts. With several blocks ``scan_index`` tells the block.
 
     Raises
     ------
@@ -76,8 +77,7 @@ def read(path: str | os.PathLike[str], *, columns: str | Sequence[str] | None = 
     attributes = _bytes_of_colors({spelled.get(column, column): values for column, values in table.items()})
     if len(sizes) > 1:
         attributes.setdefault("scan_index", np.repeat(np.arange(len(sizes), dtype=np.int32), sizes))
-    left_out = tuple(what for what in layout.unread.values() if what)
-    return Cloud(xyz, attributes, metadata={"left_out": left_out} if left_out else {})
+    return Cloud(xyz, attributes)
 
 
 def _table(path: str, lines: list[str], layout: Layout) -> dict[str, np.ndarray]:
@@ -90,9 +90,13 @@ def _table(path: str, lines: list[str], layout: Layout) -> dict[str, np.ndarray]
     if layout.names is not None:
         named = dict(enumerate(layout.names))
         return {named.get(i, f"column_{i}"): values for i, values in columns.items()}
-    if len(columns) < 3:
-        raise FormatError(f"{path}: {len(columns)} columns of numbers; x, y and z are needed")
-    return dict(zip(guess_names([*columns.values()]), columns.values(), strict=True))
+    # Words, as the name of a point before its coordinates, are no part of what numbers tell by their order.
+    numbers = [i for i, values in columns.items() if values.dtype.kind != "U"]
+    if len(numbers) < 3:
+        raise FormatError(f"{path}: {len(numbers)} columns of numbers; x, y and z are needed")
+    names = dict(zip(numbers, guess_names([columns[i] for i in numbers]), strict=True))
+    texts = {i: f"text_{i}" for i in columns if i not in names}
+    return {(names | texts)[i]: values for i, values in columns.items()}
 
 
 def _count_blocks(path: str, lines: list[str], first: int, count: int) -> list[int]:

@@ -39,8 +39,8 @@ class Layout:
         Values of the first lines.
     names : list of str or None
         Of the columns, by the header or the user.
-    unread : dict of int to str
-        Columns that are not read, and what is said of them ("": nothing, since the user left them out).
+    texts, unread : set of int
+        Columns that hold words, and those that are not read.
     """
 
     first: int
@@ -48,7 +48,8 @@ class Layout:
     delimiter: str | None = None
     sample: list[list[str]] = field(default_factory=list)
     names: list[str] | None = None
-    unread: dict[int, str] = field(default_factory=dict)
+    texts: frozenset[int] = frozenset()
+    unread: frozenset[int] = frozenset()
 
     @property
     def width(self) -> int:
@@ -61,7 +62,7 @@ class Layout:
         if self.names is not None:
             return [self.names.index(name) for name in find_axes(self.names) or ()]
         empty = {i for i in range(self.width) if all(row[i : i + 1] in ([], [""]) for row in self.sample)}
-        return [i for i in range(self.width) if i not in self.unread and i not in empty][:3]
+        return [i for i in range(self.width) if i not in self.unread | self.texts | empty][:3]
 
     @property
     def is_plain(self) -> bool:
@@ -100,17 +101,18 @@ def find_layout(path: str, lines: list[str], columns: Sequence[str] | None = Non
         remedy = "x, y and z are needed" if width < 3 else f"a point has {_MOST_COLUMNS} at most, in a line of its own"
         raise FormatError(f"{path}: line {first + 1} has {width} numbers; {remedy}")
     if columns is not None:
-        return Layout(first, count, delimiter, sample, *_given(path, columns, sample, width, first))
+        names, unread = _given(path, columns, width, first)
+        return Layout(first, count, delimiter, sample, names, _texts(sample, width), unread)
     if not words and _is_numbering(sample):  # the header of a table without names
-        return Layout(first + 1, count, delimiter, sample[1:], None, {0: ""} if sample[0][0] == "" else {})
+        unread = frozenset([0] if sample[0][0] == "" else [])
+        return Layout(first + 1, count, delimiter, sample[1:], unread=unread)
     names = None
     if words:
         quoted = bare(lines[first])[0] in "\"'"
         names = _header(path, words, Layout(first, count, delimiter, sample), quoted)
     if names is None:
         names = _header_among(path, remarks, width, delimiter)
-    unread = {i: f"text column {names[i] if names else i + 1}" for i in _texts(sample, width)}
-    return Layout(first, count, delimiter, sample, names, unread)
+    return Layout(first, count, delimiter, sample, names, _texts(sample, width))
 
 
 def as_columns(columns: str | Sequence[str]) -> list[str]:
@@ -161,9 +163,7 @@ def _find_first(lines: list[str]) -> tuple[int, int | None, list[tuple[int, str]
     return len(lines), count, words, remarks
 
 
-def _given(
-    path: str, columns: Sequence[str], sample: list[list[str]], width: int, first: int
-) -> tuple[list[str], dict[int, str]]:
+def _given(path: str, columns: Sequence[str], width: int, first: int) -> tuple[list[str], frozenset[int]]:
     """Return the names that a user gave, those of further columns, and which are not read."""
     if len(columns) > width:
         raise FormatError(
@@ -172,8 +172,7 @@ def _given(
         )
     names = [f"{_LEFT_OUT}{i}" if name == _LEFT_OUT else name for i, name in enumerate(columns)]
     names += [f"column_{i}" for i in range(len(names), width)]
-    texts = {i: f"text column {names[i]}" for i in _texts(sample, width)}
-    return names, texts | {i: "" for i, name in enumerate(columns) if name == _LEFT_OUT}
+    return _unique(names), frozenset(i for i, name in enumerate(columns) if name == _LEFT_OUT)
 
 
 def _header(path: str, words: list[tuple[int, str]], layout: Layout, quoted: bool) -> list[str]:
@@ -232,10 +231,10 @@ def _unique(names: list[str]) -> list[str]:
     return unique
 
 
-def _texts(sample: list[list[str]], width: int) -> list[int]:
+def _texts(sample: list[list[str]], width: int) -> frozenset[int]:
     """Return the columns of which over half the values are no numbers."""
     columns = ([row[i] for row in sample if i < len(row)] for i in range(width))
-    return [i for i, values in enumerate(columns) if 2 * sum(map(is_number, values)) < len(values)]
+    return frozenset(i for i, values in enumerate(columns) if 2 * sum(map(is_number, values)) < len(values))
 
 
 def _is_numbering(sample: list[list[str]]) -> bool:

@@ -17,7 +17,7 @@ _CHUNK = 65536  # lines whose values are held as texts at a time
 
 
 def parse(path: str, lines: list[str], layout: Layout) -> dict[int, np.ndarray]:
-    """Return the columns of numbers by their places in the text, integers int64 (or uint64), others float64.
+    """Return the columns by their places in the text: integers int64 (or uint64), other numbers float64, words texts.
 
     Raises
     ------
@@ -60,6 +60,9 @@ def _parse_values(path: str, lines: list[str], layout: Layout) -> dict[int, np.n
             values = [row[i] if i < len(row) else "" for row in rows]
             if any(values):
                 has_values.add(i)
+            if i in layout.texts and i not in layout.axes:
+                part[i] = np.array(values)
+                continue
             try:
                 part[i] = _numbers(values, whole=i not in layout.axes)
             except ValueError:
@@ -71,9 +74,13 @@ def _parse_values(path: str, lines: list[str], layout: Layout) -> dict[int, np.n
     # A column without name and values is what a separator at the end of every line makes.
     kept = sorted(i for i in {*has_values, *named} - {*layout.unread} if i in has_values or not _is_unnamed(layout, i))
     return {
-        i: np.concatenate([part.get(i, np.full(size, np.nan)) for part, size in zip(parts, sizes, strict=True)])
+        i: np.concatenate([part.get(i, _missing(i, size, layout)) for part, size in zip(parts, sizes, strict=True)])
         for i in kept
     }
+
+
+def _missing(column: int, size: int, layout: Layout) -> np.ndarray:
+    return np.full(size, "" if column in layout.texts else np.nan)
 
 
 def _is_unnamed(layout: Layout, column: int) -> bool:
