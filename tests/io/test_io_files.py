@@ -152,7 +152,7 @@ def test_every_shared_cloud_reads(shared_data):
             if file.name == "published.csv" or file.name.startswith(("LICENSE", "README")):
                 continue
             if file.suffix == ".obj":
-                with pytest.raises(FormatError, match="a mesh of .* faces"):
+                with pytest.raises(FormatError, match=r"a mesh of .* faces"):
                     read(file)
                 continue
             count += len(read(file)) > 0

@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from edgel.cloud import Cloud
-from edgel.io.errors import FormatError
+from edgel.io.errors import FormatError, printable
 from edgel.io.files import reading
-from edgel.io.limits import whole_number
 
 EXTENSIONS = (".ply", ".obj", ".stl", ".off")
 OFFER = "sample its surface: --sample-mesh 200000 (sample_mesh= in Python)"
@@ -49,9 +48,11 @@ def sample(path: str | os.PathLike[str], num_points: int) -> Cloud:
     50
     """
     name = os.fspath(path)
-    number = None if isinstance(num_points, bool) else whole_number(str(num_points))
-    if number is None or not 0 < number <= _MOST_POINTS:
-        raise ValueError(f"sample_mesh: expected a number of points from 1 to {_MOST_POINTS}, got {num_points!r:.40}")
+    whole = isinstance(num_points, int | np.integer) and not isinstance(num_points, bool)
+    if not whole or not 0 < num_points <= _MOST_POINTS:
+        raise ValueError(
+            f"sample_mesh: expected a number of points from 1 to {_MOST_POINTS}, got {printable(num_points, 40)}"
+        )
     try:
         import trimesh
         from trimesh.sample import sample_surface_even
@@ -74,7 +75,7 @@ def sample(path: str | os.PathLike[str], num_points: int) -> Cloud:
         raise FormatError(f"{name}: has no faces to sample; its points are the cloud: leave --sample-mesh out")
     if not (np.isfinite(area) and area > 0):
         raise FormatError(f"{name}: the area of its faces is {area:g}; mend the mesh")
-    points, faces = sample_surface_even(mesh, number, seed=0)
+    points, faces = sample_surface_even(mesh, int(num_points), seed=0)
     normals = np.asarray(mesh.triangles_cross[faces], np.float64)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     attributes = {axis: normals[:, i].astype(np.float32) for i, axis in enumerate(("nx", "ny", "nz"))}

@@ -128,8 +128,8 @@ def as_columns(columns: str | Sequence[str]) -> list[str]:
     >>> as_columns("x,y,z,_,intensity")
     ['x', 'y', 'z', '_', 'intensity']
     """
-    words = columns.split(",") if isinstance(columns, str) else list(columns)
-    if not all(isinstance(word, str) for word in words):
+    words = columns.split(",") if isinstance(columns, str) else columns
+    if not isinstance(words, list | tuple) or not all(isinstance(word, str) for word in words):
         raise TypeError(f"columns: expected names, such as 'x,y,z,intensity', got {columns!r:.80}")
     names = [word.strip() or _LEFT_OUT for word in words]
     named = [name for name in names if name != _LEFT_OUT]
