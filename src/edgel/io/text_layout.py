@@ -233,7 +233,7 @@ def _unique(names: list[str]) -> list[str]:
 
 def _texts(sample: list[list[str]], width: int) -> frozenset[int]:
     """Return the columns of which over half the values are no numbers."""
-    columns = ([row[i] for row in sample if i < len(row)] for i in range(width))
+    columns = ([row[i] for row in sample if i < len(row) and row[i]] for i in range(width))
     return frozenset(i for i, values in enumerate(columns) if 2 * sum(map(is_number, values)) < len(values))
 
 
