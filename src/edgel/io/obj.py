@@ -86,6 +86,10 @@ def _table(path: str, key: str, rows: list[str]) -> np.ndarray:
         raise FormatError(
             f"{path}: line {number} of those with {key}: expected {width} numbers, found {text!r}; mend the file"
         ) from None
+    if len(table) < len(rows):
+        raise FormatError(
+            f"{path}: of {len(rows)} lines with {key} {len(rows) - len(table)} hold nothing; mend the file"
+        )
     return np.column_stack([table[f"f{i}"] for i in range(width)])
 
 
