@@ -32,6 +32,7 @@ LAYOUTS = {
     "Octave": ("% x y z\n1.5 2 3\n% half\n4 5 6\n", {}),
     "psql": (" x | y | z \n---+---+---\n 1.5 | 2 | 3\n 4 | 5 | 6\n", {}),
     "a preamble": ("Exported by a program 1.2\nof 2 points\n\nX,Y,Z,I\n1.5,2,3,8\n4,5,6,9\n", {"I": [8, 9]}),
+    "units below the names": ("x;y;z;i\n[mm];[mm];[mm];[-]\n1,5;2;3;4\n4;5;6;7\n", {"i": [4, 7]}),
     "Fortran": ("1.5D+00 2.0D0 3.0d0\n4D0 5D0 6D0\n", {}),
     "C on Windows": ("1.5 2 3 -1.#IND\n4 5 6 -1.#INF\n", {"intensity": [NAN, -np.inf]}),
     "words for nothing": ("x,y,z,i,j\n1.5,2,3,NULL,N/A\n4,5,6,-nan(ind),<NA>\n", {"i": [NAN] * 2, "j": [NAN] * 2}),
@@ -128,6 +129,8 @@ def test_names_of_coordinates(tmp_path, header, separator, comment):
         ("vx,vy,vz\n1,2,3\n", "the columns are vx, vy, vz"),
         ("2\n1 2 3\n4 5 6\n2\n7 8 9\n", "declared 2 points in block 2, found 1"),
         ("a,b\nP,Q\n", "line 1"),
+        ('{"x": [1, 2, 3], "y": [4, 5, 6], "z": [7, 8, 9]}\n', "line 1"),
+        ("[[1.5 2. 3.]\n [4. 5. 6.]]\n", "line 1"),
     ],
 )
 def test_what_cannot_be_told_is_refused(tmp_path, text, message):

@@ -18,11 +18,11 @@ _AROUND = (
     "points?|pos(?:ition)?|koordinaten?|coord(?:inate)?s?|loc(?:ation|al)?|vertex|vertices|pose|field|xyz|scan|utm|"
     f"world|global|cent(?:er|re)|{_EAST}|{_NORTH}|{_HEIGHT}"
 )
-_AFTER = f"(?:{_AROUND}|[munckµ]?m|met(?:er|re)s?|us|ft|feet|foot|in|inch(?:es)?)*"
-_PLAIN = {axis: re.compile(f"(?:{_AROUND})*{axis}{_AFTER}") for axis in "xyz"}
-_NUMBERED = {axis: re.compile(f"(?:{_AROUND})+{i}") for i, axis in enumerate("xyz")}
+_AFTER = f"(?:{_AROUND}|[munckµ]?m|met(?:er|re)s?|us|ft|feet|foot|in|inch(?:es)?){{0,4}}"
+_PLAIN = {axis: re.compile(f"(?:{_AROUND}){{0,4}}{axis}{_AFTER}") for axis in "xyz"}
+_NUMBERED = {axis: re.compile(f"(?:{_AROUND}){{1,4}}{i}") for i, axis in enumerate("xyz")}
 _ON_MAPS = {
-    axis: re.compile(f"(?:{_AROUND})*(?:{words}){_AFTER}")
+    axis: re.compile(f"(?:{_AROUND}){{0,4}}(?:{words}){_AFTER}")
     for axis, words in {"x": f"e|{_EAST}|rw", "y": f"n|{_NORTH}|hw", "z": f"[zh]|up|rl|{_HEIGHT}"}.items()
 }
 _DEGREES = [re.compile(f"{word}(?:itude)?(?:deg(?:rees?)?)?(?:wgs84)?") for word in ("lat", "lon|lng|long")]

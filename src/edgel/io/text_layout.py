@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from edgel.io.errors import FormatError
 from edgel.io.limits import whole_number
@@ -17,8 +18,9 @@ _SAMPLE = 200
 _MOST_COLUMNS = 4096
 _NUMBER = re.compile(r"\d|nan|inf", re.IGNORECASE)
 _HEADER_WORD = re.compile(r"[^\W\d][\w .:()\[\]/-]*")
-_INTRODUCTION = re.compile(r"[\w ]+[:=]\s+")
+_INTRODUCTION = re.compile(r"\A[\w ]+[:=]\s+")
 _UNIT = re.compile(r"\s*([\[(])\s*([^\])]*?)\s*([\])])")
+_LONGEST_UNITS = 4096  # characters of a header: its brackets are looked for in quadratic time
 _SPREADSHEET = re.compile(r"\"?sep=.\"?", re.IGNORECASE)
 _LEFT_OUT = "_"
 
@@ -51,12 +53,12 @@ class Layout:
     texts: frozenset[int] = frozenset()
     unread: frozenset[int] = frozenset()
 
-    @property
+    @cached_property
     def width(self) -> int:
         """Number of columns: between marks of the longest of the first lines, between blanks of the first."""
         return max(map(len, self.sample if self.delimiter else self.sample[:1]), default=0)
 
-    @property
+    @cached_property
     def axes(self) -> list[int]:
         """Columns of x, y and z; the first three where there is no header. Empty where they are not known."""
         if self.names is not None:
@@ -156,7 +158,8 @@ def _find_first(lines: list[str]) -> tuple[int, int | None, list[tuple[int, str]
             if count is not None:
                 continue
         numbers = sum(bool(_NUMBER.search(token)) and is_number(token) for token in tokens)
-        if numbers >= 3 or (numbers and all(map(is_number, tokens))):
+        # What begins with a bracket is JSON, or printed arrays, whose words would pass for columns.
+        if text[0] not in "{[(<" and (numbers >= 3 or (numbers and all(map(is_number, tokens)))):
             return number, count, words, remarks
         if not _SPREADSHEET.fullmatch(text):
             words.append((number, text))
@@ -176,8 +179,9 @@ def _given(path: str, columns: Sequence[str], width: int, first: int) -> tuple[l
 
 
 def _header(path: str, words: list[tuple[int, str]], layout: Layout, quoted: bool) -> list[str]:
-    """Return the names in the last line of words before the numbers."""
-    text = words[-1][1]
+    """Return the names in the last line of words before the numbers that holds those of coordinates, or in the last."""
+    known_lines = (line for _, line in reversed(words) if find_axes(_split_header(line, layout.delimiter)))
+    text = next(known_lines, words[-1][1])  # units may stand below it
     names, width = _split_header(text, layout.delimiter), layout.width
     known = find_axes(names) is not None
     if not known and (len(words) > 1 or len(names) < 3 or not all(map(_HEADER_WORD.fullmatch, names))):
@@ -214,7 +218,7 @@ def _split_header(text: str, delimiter: str | None) -> list[str]:
     """Return the names in a header, which may have a separator of its own."""
     if delimiter is None or delimiter not in text:
         delimiter = separator(text)
-    if delimiter is None and not text.count('"'):
+    if delimiter is None and '"' not in text and len(text) < _LONGEST_UNITS:
         text = _UNIT.sub(r"\1\2\3", text)  # "X [mm]" is one name
     return split(text, delimiter)
 
