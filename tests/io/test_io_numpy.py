@@ -215,7 +215,7 @@ def test_depth_images_without_or_with_wrong_camera(tmp_path):
         read(tmp_path / "a.png", intrinsics=Intrinsics(1, 1, 1, 1, width=640, height=480))
     (tmp_path / "a.intr").write_text("{}")
     (tmp_path / "b.intr").write_text("{}")
-    with pytest.raises(FormatError, match="2 intrinsics files"):
+    with pytest.raises(FormatError, match="2 files of cameras"):
         read(tmp_path / "a.png")
     np.save(tmp_path / "wide.npy", np.ones((20, 30)))
     with pytest.raises(FormatError, match="depth image needs its camera"):

@@ -113,7 +113,7 @@ def test_integers_are_exact_and_may_become_floats_late(tmp_path):
         ("x y z\n1 2 3\n4 5 6 7\n", "line 3: expected 3 numbers"),
         ("1 2\n3 4\n", "x, y and z are needed"),
         ("1\n2\n3\n", "expected|needed|declared"),
-        ("E,N,H\n1,2,3\n", "the columns are E, N, H"),
+        ("A,B,C\n1,2,3\n", "the columns are A, B, C"),
         ("x y z\n1 2 3 4\n", "the header .* names 3 columns, line 2 has 4"),
         ("3\n1 2 3\n4 5 6\n", "declared 3 points in its first line, found 2"),
         ("# only\n# remarks\n", "no line of numbers"),

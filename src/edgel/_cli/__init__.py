@@ -25,7 +25,8 @@ _HELP = """Find the edges of 3D point clouds, and their normals, without tuning.
   edgel view scan.ply                   look at them in the browser
   edgel demo                            two pipe fittings, with a report
 
-Reads PLY, PCD, LAS/LAZ, E57, XYZ/TXT/CSV/ASC/PTS, NPY/NPZ and depth images (PNG, TIFF, NPY); writes all but the images.
+Reads PLY, PCD, LAS/LAZ, E57, XYZ/TXT/CSV/ASC/PTS, PTX, NPY/NPZ, BIN (KITTI, nuScenes), OBJ of points, depth images
+(PNG, TIFF, NPY), and samples meshes (PLY, OBJ, STL, OFF); writes PLY, PCD, LAS/LAZ, E57, texts and NPY/NPZ.
 """
 _EPILOG = (
     "Exit codes: 0 done, 1 an error inside edgel, 2 wrong usage, 3 the input cannot be read, 4 its data cannot be "

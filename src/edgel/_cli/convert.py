@@ -30,6 +30,8 @@ def convert(
     source: options.Input,
     output: Annotated[str, typer.Argument(metavar="OUT", help="The cloud to write; - writes PLY to stdout.")],
     intrinsics: options.Intrinsics = None,
+    columns: options.Columns = None,
+    sample_mesh: options.SampleMesh = None,
     check: Annotated[bool, typer.Option("--check/--no-check", help="Read the file back and compare.")] = True,
     no_clobber: options.NoClobber = False,
     debug: options.Debug = False,
@@ -37,11 +39,12 @@ def convert(
     """Convert a cloud from any format to any other."""
     with exit_codes(debug=debug):
         files.check_output(output, no_clobber=no_clobber)
-        in_place = files.check_in_place(output, source, intrinsics)
-        files.check_input(source, intrinsics)
+        reading = files.Reading(intrinsics, columns, sample_mesh)
+        in_place = files.check_in_place(output, source, reading)
+        files.check_input(source, reading)
         with Watch() as watch:
             watch("reading")
-            cloud = files.read_cloud(source, intrinsics)
+            cloud = files.read_cloud(source, reading)
             watch("writing")
             if in_place:
                 check_kept(output, cloud, cloud)
@@ -50,6 +53,7 @@ def convert(
             if check:
                 watch("comparing")
                 lost = differences(cloud, read_back(output, cloud))
+        files.tell_notices(source, cloud)
         if lost:
             print_line(f"{output}: the format could not keep all", style="yellow")
         for line in lost:

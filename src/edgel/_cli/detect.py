@@ -35,6 +35,8 @@ Examples:
   edgel detect scan.ply -o edges.ply
   edgel detect scan.las -o labelled.laz --all
   edgel detect depth.png --intrinsics camera.json -o edges.ply
+  edgel detect scan.txt --columns _,x,y,z,intensity -o edges.ply
+  edgel detect part.stl --sample-mesh 200000 -o edges.ply
   edgel detect scan.ply --kinds crease,boundary --method surface -o edges.ply
   edgel detect scan.ply --scale 4 --min-angle 30 -o large.ply
   edgel detect scan.ply --method paper --sigma 2 --report report
@@ -90,6 +92,8 @@ def detect(
         ),
     ] = None,
     intrinsics: options.Intrinsics = None,
+    columns: options.Columns = None,
+    sample_mesh: options.SampleMesh = None,
     width: Annotated[int | None, options.paper_option("width", "Pixels of the image along x.")] = None,
     height: Annotated[int | None, options.paper_option("height", "Pixels of the image along y.")] = None,
     kernel_size: Annotated[
@@ -125,17 +129,18 @@ def detect(
     page = None
     with exit_codes(as_json=as_json, debug=debug):
         given = check_options(method, given)
+        reading = files.Reading(intrinsics, columns, sample_mesh)
         in_place = check_outputs(
-            output, report, source, intrinsics, label_all=label_all, as_json=as_json, no_clobber=no_clobber
+            output, report, source, reading, label_all=label_all, as_json=as_json, no_clobber=no_clobber
         )
         if method == options.PAPER and min_angle is not None:
             raise Failure(ExitCode.USAGE, "--min-angle: the published method tells no creases apart; leave it out")
         if crop is not None and not all(low <= high for low, high in zip(crop[:3], crop[3:], strict=True)):
             raise Failure(ExitCode.USAGE, f"--crop: the first corner must be the lower one, got {crop}")
-        files.check_input(source, intrinsics)
+        files.check_input(source, reading)
         with Watch() as watch:
             stages = Stages(watch)
-            cloud, edges = find_edges(source, intrinsics, method, given, stages)
+            cloud, edges = find_edges(source, reading, method, given, stages)
             edges = choose(cloud, edges, min_angle, crop)
             if output is not None:
                 with stages("writing"):
@@ -150,6 +155,7 @@ def detect(
         if as_json:
             print_json(collect(source, output, page, edges, stages.seconds, aside))
             return
+        files.tell_notices(source, cloud)
         print_table(f"Edges of {source}", summary(edges, stages.seconds))
         if edges.share > _SUSPICIOUS_SHARE:
             print_line(
@@ -182,7 +188,7 @@ def check_outputs(
     output: str | None,
     report: str | None,
     source: str,
-    intrinsics: str | None,
+    reading: files.Reading,
     *,
     label_all: bool,
     as_json: bool,
@@ -200,11 +206,11 @@ def check_outputs(
         from edgel._report import file_names  # not at the top: Matplotlib takes time to import
 
         names = file_names([name_of(source)])
-        files.check_new_folder(report, names, inputs=[source, intrinsics], no_clobber=no_clobber)
+        files.check_new_folder(report, names, inputs=[source, reading.intrinsics], no_clobber=no_clobber)
     if output is None:
         return False
     files.check_output(output, no_clobber=no_clobber)
-    return files.check_in_place(output, source, intrinsics, whole=label_all)
+    return files.check_in_place(output, source, reading, whole=label_all)
 
 
 def name_of(source: str) -> str:

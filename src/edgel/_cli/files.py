@@ -8,6 +8,7 @@ import sys
 import tempfile
 import warnings
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
@@ -22,29 +23,59 @@ if TYPE_CHECKING:
 PIPE = "-"
 
 
-def check_input(path: str, intrinsics: str | None = None) -> None:
+@dataclass(frozen=True)
+class Reading:
+    """How inputs are to be read.
+
+    Attributes
+    ----------
+    intrinsics : str or None
+        The file of the camera of depth images.
+    columns : str or None
+        Names of the columns of texts, commas between.
+    sample_mesh : int or None
+        Points to sample from meshes.
+    """
+
+    intrinsics: str | None = None
+    columns: str | None = None
+    sample_mesh: int | None = None
+
+
+def check_input(path: str, reading: Reading) -> None:
     """Raise a `Failure` for an input that cannot be read, before anything else happens."""
     from edgel.io.files import check_readable
 
     if path == PIPE:
         if sys.stdin.isatty():
             raise Failure(ExitCode.USAGE, "IN is -, and no file is piped in; use `edgel ... - < cloud.ply`, or name it")
-        if intrinsics is not None:
+        if reading.intrinsics is not None:
             raise Failure(ExitCode.USAGE, "--intrinsics: the pipe carries PLY, which needs none; name the depth image")
+        for option, value in (("--columns", reading.columns), ("--sample-mesh", reading.sample_mesh)):
+            if value is not None:
+                raise Failure(ExitCode.USAGE, f"{option}: the pipe carries PLY of points; name the file")
         return
     with failing_as(ExitCode.INPUT, path):
         check_readable(path)
-    if intrinsics is not None:
-        with failing_as(ExitCode.INPUT, intrinsics):
-            check_readable(intrinsics)
+    if reading.intrinsics is not None:
+        with failing_as(ExitCode.INPUT, reading.intrinsics):
+            check_readable(reading.intrinsics)
 
 
-def read_cloud(path: str, intrinsics: str | None = None) -> Cloud:
+def read_cloud(path: str, reading: Reading = Reading()) -> Cloud:
     """Read a cloud, PLY from stdin when the path is ``-``."""
     from edgel import io  # not at the top: `edgel --help` reads nothing
 
-    with failing_as(ExitCode.INPUT, "stdin" if path == PIPE else path, ["intrinsics"]):
-        return io.read(sys.stdin.buffer) if path == PIPE else io.read(path, intrinsics=intrinsics)
+    with failing_as(ExitCode.INPUT, "stdin" if path == PIPE else path, ["intrinsics", "columns", "sample_mesh"]):
+        if path == PIPE:
+            return io.read(sys.stdin.buffer)
+        return io.read(path, intrinsics=reading.intrinsics, columns=reading.columns, sample_mesh=reading.sample_mesh)
+
+
+def tell_notices(path: str, cloud: Cloud) -> None:
+    """Say what a reader found that the user should know: a mesh, the camera that was used."""
+    for notice in cloud.metadata.get("notices", ()):
+        print_line(f"{path}: {notice}", style="yellow")
 
 
 def check_output(path: str, *, no_clobber: bool = False) -> None:
@@ -100,7 +131,7 @@ def check_not_input(output: str, inputs: Iterable[str | None], remedy: str = "na
             raise Failure(ExitCode.USAGE, f"{'stdout' if output == PIPE else output}: {same}; {remedy}")
 
 
-def check_in_place(output: str, source: str, intrinsics: str | None, *, whole: bool = True) -> bool:
+def check_in_place(output: str, source: str, reading: Reading, *, whole: bool = True) -> bool:
     """Return whether an output is the input itself, or raise a `Failure` where it would hold less than that.
 
     Parameters
@@ -108,12 +139,12 @@ def check_in_place(output: str, source: str, intrinsics: str | None, *, whole: b
     whole : bool
         Whether every point will be written, as `edgel._cli.compare.check_kept` demands then.
     """
-    check_not_input(output, [intrinsics])
+    check_not_input(output, [reading.intrinsics])
     formats = [".ply" if path == PIPE else Path(path).suffix.lower() for path in (output, source)]
     if not whole:
         remedy = "the edge points alone would replace it: name another file, or add --all, which keeps every point"
         check_not_input(output, [source], remedy)
-    elif output == PIPE or intrinsics is not None or formats[0] != formats[1]:
+    elif output == PIPE or reading != Reading() or formats[0] != formats[1]:
         check_not_input(output, [source])
     return is_same_file(output, source)
 

@@ -34,15 +34,18 @@ _SAMPLE = 200_000  # points whose nearest neighbour is looked for; the median ne
 def info(
     source: options.Input,
     intrinsics: options.Intrinsics = None,
+    columns: options.Columns = None,
+    sample_mesh: options.SampleMesh = None,
     as_json: options.AsJson = False,
     debug: options.Debug = False,
 ) -> None:
     """Say what a file holds."""
     with exit_codes(as_json=as_json, debug=debug):
-        files.check_input(source, intrinsics)
+        reading = files.Reading(intrinsics, columns, sample_mesh)
+        files.check_input(source, reading)
         with Watch() as watch:
             watch("reading")
-            cloud = files.read_cloud(source, intrinsics)
+            cloud = files.read_cloud(source, reading)
             watch("looking at the points")
             with failing_as(ExitCode.DATA, source):
                 facts = {"input": source, **describe(cloud)}
@@ -67,6 +70,8 @@ def describe(cloud: Cloud) -> dict[str, Any]:
         "fields": [describe_field(name, values) for name, values in cloud.attributes.items()],
         "viewpoint": cloud.viewpoint,
         "crs": cloud.crs,
+        "left_out": cloud.metadata.get("left_out", ()),
+        "notices": cloud.metadata.get("notices", ()),
     }
 
 
@@ -140,7 +145,8 @@ def overview(facts: dict[str, Any]) -> list[tuple[str, ...]]:
         # WKT is long, its first name says which system it is; all of it is in the JSON.
         name = re.search(r'"([^"]+)"', facts["crs"])
         rows.append(("crs", "", name.group(1) if name else facts["crs"]))
-    return rows
+    rows += [("left out", "", what) for what in facts["left_out"]]
+    return rows + [("notice", "", what) for what in facts["notices"]]
 
 
 def number(value: Any) -> str:

@@ -59,11 +59,11 @@ def check_options(method: str, given: dict[str, Any]) -> dict[str, Any]:
 
 
 def find_edges(
-    source: str, intrinsics: str | None, method: str, given: Mapping[str, Any], stages: Stages
+    source: str, reading: files.Reading, method: str, given: Mapping[str, Any], stages: Stages
 ) -> tuple[edgel.Cloud, Edges]:
     """Read a cloud and find its edges, with the options that `check_options` let through."""
     with stages("reading"):
-        cloud = files.read_cloud(source, intrinsics)
+        cloud = files.read_cloud(source, reading)
     with failing_as(ExitCode.DATA, source, arguments(method)):
         edges = detector(method)(cloud, **given, progress=stages.progress)
     stages.seconds.update(edges.seconds)

@@ -43,6 +43,8 @@ def normals(
     ] = None,
     viewpoint: options.Viewpoint = None,
     intrinsics: options.Intrinsics = None,
+    columns: options.Columns = None,
+    sample_mesh: options.SampleMesh = None,
     no_clobber: options.NoClobber = False,
     debug: options.Debug = False,
 ) -> None:
@@ -50,12 +52,13 @@ def normals(
     given = options.given(num_neighbors=num_neighbors, viewpoint=viewpoint)
     with exit_codes(debug=debug):
         files.check_output(output, no_clobber=no_clobber)
-        in_place = files.check_in_place(output, source, intrinsics)
-        files.check_input(source, intrinsics)
+        reading = files.Reading(intrinsics, columns, sample_mesh)
+        in_place = files.check_in_place(output, source, reading)
+        files.check_input(source, reading)
         with Watch() as watch:
             stages = Stages(watch)
             with stages("reading"):
-                cloud = files.read_cloud(source, intrinsics)
+                cloud = files.read_cloud(source, reading)
             with stages("normals"), failing_as(ExitCode.DATA, source, given):
                 planes = edgel.estimate_normals(cloud, **given)
             with stages("writing"):
@@ -64,6 +67,7 @@ def normals(
                 if in_place:
                     check_kept(output, cloud, written)
                 files.write_cloud(output, written, no_clobber=no_clobber)
+        files.tell_notices(source, cloud)
         rows: list[tuple[str, ...]] = [("points", count(len(cloud)))]
         not_finite = int(np.isnan(cloud.xyz.sum(axis=1) * 0).sum())
         if not_finite:

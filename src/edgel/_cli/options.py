@@ -19,7 +19,24 @@ METHODS = (*OWN_METHODS, PAPER)
 Input = Annotated[str, typer.Argument(metavar="IN", help="The cloud to read; - reads PLY from stdin.")]
 Intrinsics = Annotated[
     str | None,
-    typer.Option(metavar="FILE", help="Camera of a depth image: JSON with fx, fy, cx, cy.", show_default=False),
+    typer.Option(metavar="FILE", help="Camera of a depth image: JSON or YAML with fx, fy, cx, cy.", show_default=False),
+]
+Columns = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAMES",
+        help="Names of the columns of a text or .bin, as in x,y,z,intensity; _ leaves one out."
+        + " [dim]\\[default: what the file says][/dim]",
+        show_default=False,
+    ),
+]
+SampleMesh = Annotated[
+    int | None,
+    typer.Option(
+        metavar="POINTS",
+        help="Sample so many points from the surface of a mesh (PLY, OBJ, STL, OFF), evenly by area.",
+        show_default=False,
+    ),
 ]
 Viewpoint = Annotated[
     tuple[float, float, float] | None,

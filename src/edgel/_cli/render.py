@@ -62,6 +62,8 @@ def render(
     ),
     viewpoint: options.Viewpoint = None,
     intrinsics: options.Intrinsics = None,
+    columns: options.Columns = None,
+    sample_mesh: options.SampleMesh = None,
     no_clobber: options.NoClobber = False,
     debug: options.Debug = False,
 ) -> None:
@@ -77,10 +79,11 @@ def render(
         files.check_extension(output, [".png"])
         files.check_file(output, no_clobber=no_clobber)
         files.check_not_input(output, [source, intrinsics])
-        files.check_input(source, intrinsics)
+        reading = files.Reading(intrinsics, columns, sample_mesh)
+        files.check_input(source, reading)
         with Watch() as watch:
             stages = Stages(watch)
-            cloud, edges = find_edges(source, intrinsics, method, given, stages)
+            cloud, edges = find_edges(source, reading, method, given, stages)
             if min_strength is not None:  # the published method does not leave any out itself
                 edges = edges.take(edges.strength >= min_strength)
             with stages("drawing"), failing_as(ExitCode.DATA, source, look):
@@ -88,6 +91,7 @@ def render(
             with stages("writing"), failing_as(ExitCode.OUTPUT, output):
                 files.check_clobber(output, no_clobber=no_clobber)
                 save(output, drawn)
+        files.tell_notices(source, cloud)
         rows = [("points", count(edges.num_points)), ("edge points", count(len(edges)), f"{edges.share:.1%}")]
         rows += [(f"  {name}", count(number)) for name, number in edges.count_kinds().items()]
         rows.append(("time", seconds(sum(stages.seconds.values()))))

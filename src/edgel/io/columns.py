@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable
 
 import numpy as np
 
 from edgel.cloud import Cloud
-
-COLORS = ["red", "green", "blue"]
-NORMALS = ["nx", "ny", "nz"]
-_SHORT_COLORS = dict(zip("rgb", COLORS, strict=True))
 
 
 def flat_attributes(
@@ -113,22 +109,6 @@ def narrowed(values: np.ndarray, codes: Iterable[str]) -> np.ndarray | None:
         if fits:
             return values.astype(dtype, copy=False)
     return None
-
-
-def find_xyz(names: Iterable[str]) -> list[str] | None:
-    """Return the names of the x, y and z columns (upper or lower case), None when one is missing."""
-    lower: dict[str, str] = {}
-    for name in names:
-        lower.setdefault(name.lower(), name)
-    return [lower[axis] for axis in "xyz"] if all(axis in lower for axis in "xyz") else None
-
-
-def spell_out_colors(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Call columns r, g, b (all three there, any case) red, green and blue, as every other format does."""
-    lower = {name.lower() for name in columns}
-    if not {"r", "g", "b"} <= lower or lower & set(_SHORT_COLORS.values()):
-        return dict(columns)
-    return {_SHORT_COLORS.get(name.lower(), name): values for name, values in columns.items()}
 
 
 def fits_float32(xyz: np.ndarray) -> bool:

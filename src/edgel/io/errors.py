@@ -24,7 +24,10 @@ def printable(text: object, longest: int = LONGEST) -> str:
     >>> printable("a" * 1_000_000, 9)
     'aaaaaa ... (999,991 characters left out) ... aaa'
     """
-    shown = str(text)
+    try:
+        shown = str(text)
+    except ValueError:  # an integer of more digits than Python turns into text
+        return "a number of thousands of digits"
     if not shown.isprintable():
         shown = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in shown)
     if len(shown) <= longest:

@@ -11,6 +11,7 @@ import numpy as np
 from laspy.point import dims
 from laspy.vlrs.vlrlist import VLRList
 
+from edgel._objects import COLORS
 from edgel.cloud import Cloud
 from edgel.io.errors import FormatError
 from edgel.io.las_crs import crs_of, set_crs
@@ -69,7 +70,7 @@ def header_for(
     else:
         # EPSG codes go into GeoTIFF keys, which formats below 6 have; formats from 6 on demand WKT.
         legacy = "scan_angle_rank" in attributes or (cloud.crs or "").upper().startswith("EPSG:")
-        color = all(name in attributes for name in ("red", "green", "blue"))
+        color = all(name in attributes for name in COLORS)
         point_format = (3 if color else 1) if legacy else 7 if color else 6
         if not legacy and color and "nir" in attributes:
             point_format = 8

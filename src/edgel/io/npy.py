@@ -8,10 +8,10 @@ from typing import IO
 
 import numpy as np
 
-from edgel.cloud import Cloud
+from edgel.cloud import Cloud, as_cloud
 from edgel.io import depth
 from edgel.io.arrays import read_array
-from edgel.io.columns import find_xyz, free_name
+from edgel.io.columns import free_name
 from edgel.io.errors import FormatError, tell
 from edgel.io.files import reading, replacing, wrong_magic
 from edgel.io.limits import check_unpacked
@@ -61,17 +61,11 @@ def read_npy(path: str | os.PathLike[str]) -> Cloud:
 
 
 def _cloud_of(path: str, array: np.ndarray) -> Cloud:
-    shape = array.shape[:2] if array.ndim == 3 or (array.ndim == 2 and array.dtype.names) else None
     if array.dtype.names:
-        axes = find_xyz(array.dtype.names)
-        if axes is None or array.ndim not in (1, 2) or any(array.dtype[axis].shape for axis in axes):
-            raise FormatError(
-                f"{path}: records of {', '.join(array.dtype.names)}, shape {array.shape}; x, y and z are needed"
-            )
-        flat = array.reshape(-1)
-        xyz = np.column_stack([_numbers(path, flat[axis]) for axis in axes])
-        rest = {name: np.ascontiguousarray(flat[name]) for name in array.dtype.names if name not in axes}
-        return Cloud(xyz, rest, shape)
+        try:
+            return as_cloud(array)
+        except (TypeError, ValueError) as error:
+            raise FormatError(f"{path}: {str(error).removeprefix('points: ')}") from None
     if array.ndim == 3 and array.shape[2] == 3:
         return Cloud(_numbers(path, array))
     if array.ndim == 2 and 3 <= array.shape[1] <= _MAX_COLUMNS:

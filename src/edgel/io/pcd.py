@@ -8,13 +8,15 @@ from typing import BinaryIO
 
 import numpy as np
 
+from edgel._objects import NORMALS
 from edgel.cloud import Cloud
 from edgel.io.errors import FormatError
 from edgel.io.files import reading
 from edgel.io.limits import check_unpacked
 from edgel.io.lzf import lzf_decompress
+from edgel.io.names import standard_names
 from edgel.io.pcd_header import Header, read_header
-from edgel.io.pcd_write import NORMALS, is_meaningful, write
+from edgel.io.pcd_write import is_meaningful, write
 from edgel.io.rows import parse_text, read_binary, reject_row, remaining_bytes
 
 __all__ = ["read", "write"]
@@ -35,10 +37,10 @@ def read(path: str | os.PathLike[str]) -> Cloud:
     Cloud
         Fields as attributes of their own type, (N, C) where COUNT is C; padding fields (``_``) left out. Packed ``rgb``
         or ``rgba`` becomes ``red``, ``green``, ``blue`` (uint8), and ``alpha`` from ``rgba`` when it is not 0 or 255
-        throughout. HEIGHT above 1 makes the cloud organized. The translation of VIEWPOINT is the viewpoint (none where
-        it is 0 0 0, PCL's filler, in a cloud that is not organized); all seven numbers are in
-        ``metadata["pcd_viewpoint"]``. ``normal_x normal_y normal_z`` become ``nx ny nz``. The shift that `write` takes
-        from large coordinates is added again. Coordinates of an ascii file are parsed as double even where SIZE is 4.
+        throughout; ``normal_x normal_y normal_z`` become ``nx ny nz``. HEIGHT and WIDTH above 1 make the cloud
+        organized. The translation of VIEWPOINT is the viewpoint (none where it is 0 0 0, PCL's filler, in a cloud that
+        is not organized); all seven numbers are in ``metadata["pcd_viewpoint"]``. The shift that `write` takes from
+        large coordinates is added again. Coordinates of an ascii file are parsed as double even where SIZE is 4.
 
     Raises
     ------
@@ -59,15 +61,13 @@ def read(path: str | os.PathLike[str]) -> Cloud:
         body = {"ascii": _read_ascii, "binary": _read_plain, "binary_compressed": _read_compressed}[header.data]
         xyz, fields = body(name, file, header)
     attributes: dict[str, np.ndarray] = {}
+    spelled = {field: name for field, name in standard_names([*fields]).items() if name in NORMALS}
     for field, values in fields.items():
         if field.lower() in ("rgb", "rgba") and values.ndim == 1 and values.dtype.itemsize == 4:
             attributes.update(_unpack_colors(values, with_alpha=field.lower() == "rgba"))
         else:
-            attributes[field] = values
-    if set(NORMALS.values()) <= set(attributes) and not set(NORMALS) & set(attributes):
-        short = {long: name for name, long in NORMALS.items()}
-        attributes = {short.get(field, field): values for field, values in attributes.items()}
-    shape = (header.height, header.width) if header.height > 1 and header.count else None
+            attributes[spelled.get(field, field)] = values
+    shape = (header.height, header.width) if min(header.height, header.width) > 1 else None
     viewpoint = np.array(header.viewpoint[:3]) if header.viewpoint else None
     if viewpoint is not None and shape is None and not viewpoint.any():
         viewpoint = None  # what every writer puts where no sensor is known; a map in UTM is not seen from 0, 0, 0

@@ -8,7 +8,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from edgel.io.columns import find_xyz
+from edgel._objects import find_xyz
 from edgel.io.errors import FormatError
 from edgel.io.files import wrong_magic
 from edgel.io.limits import LONGEST_HEADER, whole_number
@@ -81,18 +81,20 @@ def _parse_header(path: str, entries: dict[str, list[str]], num_lines: int) -> H
         found = f"{len(fields)} FIELDS, {len(sizes)} SIZE, {len(types)} TYPE, {len(counts)} COUNT"
         raise FormatError(f"{path}: the PCD header does not fit together ({found}); mend or re-export the file")
     axes = find_xyz(fields)
-    if axes is None:
+    if axes is None or not {*axes} <= {field for field, count in zip(fields, counts, strict=True) if count.strip("0")}:
         raise FormatError(f"{path}: the PCD fields are {' '.join(fields)}; x, y and z are needed")
     layout, padding = [], []
     for i, (field, size, kind, count) in enumerate(zip(fields, sizes, types, counts, strict=True)):
-        number = whole_number(count) or 0
-        if size not in _TYPES.get(kind.upper(), ()) or not 0 < number <= _MOST_VALUES:
+        number = whole_number(count)
+        if size not in _TYPES.get(kind.upper(), ()) or number is None or number > _MOST_VALUES:
             raise FormatError(
                 f"{path}: PCD field {field!r} has TYPE {kind} SIZE {size} COUNT {count}; mend or re-export the file"
             )
+        if number == 0:
+            continue  # padding of nothing, as PCL writes it between fields that need none
         if field == "_":
             padding.append(f"_{i}")
-        shape = () if count == "1" else (number,)
+        shape = () if number == 1 else (number,)
         layout.append((f"_{i}" if field == "_" else field, "<" + kind.lower() + size, shape))
     if sum(int(count) for count in counts) > _MOST_VALUES:
         raise FormatError(f"{path}: PCD COUNT {' '.join(counts)[:60]}: more than {_MOST_VALUES} values a point")

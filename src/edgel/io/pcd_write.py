@@ -6,16 +6,15 @@ import os
 
 import numpy as np
 
+from edgel._objects import COLORS, NORMALS
 from edgel.cloud import Cloud
-from edgel.io.columns import COLORS, fits_float32, flat_attributes, narrowed
+from edgel.io.columns import fits_float32, flat_attributes, narrowed
 from edgel.io.errors import tell
 from edgel.io.files import replacing
 from edgel.io.pcd_header import SHIFT
 from edgel.io.rows import write_binary
 
-NORMALS = {"nx": "normal_x", "ny": "normal_y", "nz": "normal_z"}
-"""PCL's names of the normal, by ours."""
-
+_PCL_NORMALS = dict(zip(NORMALS, ("normal_x", "normal_y", "normal_z"), strict=True))
 _IDENTITY = (1.0, 0.0, 0.0, 0.0)
 # Fields of PCL's own point types: under another type they are not found.
 _PCL_TYPES = {"intensity": "f4", "label": "u4", "curvature": "f4"}
@@ -64,7 +63,9 @@ def write(path: str | os.PathLike[str], cloud: Cloud) -> None:
     said: dict[str, str] = {}
     xyz, shift, coordinate = _coordinates(cloud, said)
     columns: dict[str, np.ndarray] = {}
-    normals = NORMALS if not set(NORMALS.values()) & set(cloud.attributes) else {}
+    # One component alone, or beside columns of these names, would not be read back as a normal.
+    both = {*NORMALS, *_PCL_NORMALS.values()} & {*cloud.attributes}
+    normals = _PCL_NORMALS if both == {*NORMALS} else {}
     for name, values in flat_attributes(cloud, said, keep_arrays=True, taken=_TAKEN).items():
         stored = narrowed(values, _types(name, values))
         if stored is None:

@@ -5,15 +5,17 @@ from __future__ import annotations
 import os
 from io import BytesIO, TextIOWrapper
 from itertools import islice
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 
+from edgel._objects import COLORS, NORMALS, find_xyz
 from edgel.cloud import Cloud
-from edgel.io.columns import COLORS, NORMALS, find_xyz, fits_float32, flat_attributes, narrowed, one_line
+from edgel.io.columns import fits_float32, flat_attributes, narrowed, one_line
 from edgel.io.errors import FormatError, tell
 from edgel.io.files import reading, replacing
 from edgel.io.limits import LONGEST_LINE, whole_number
+from edgel.io.mesh import OFFER
 from edgel.io.ply_grid import range_grid, read_grid, spread
 from edgel.io.ply_header import NAMES, Element, Header, cut_off, read_header
 from edgel.io.ply_lists import gather, skip, walk
@@ -22,6 +24,7 @@ from edgel.io.rows import number_of, parse_text, read_binary, reject_row, remain
 # CloudCompare's mark of a scalar field; what other programs know by name has none.
 PREFIX = "scalar_"
 _KNOWN = {*COLORS, "alpha", *NORMALS, "intensity"}
+_FACES = ("face", "faces", "tristrips")
 
 
 def read(path: str | os.PathLike[str] | BinaryIO) -> Cloud:
@@ -36,9 +39,9 @@ def read(path: str | os.PathLike[str] | BinaryIO) -> Cloud:
     -------
     Cloud
         All scalar vertex properties as (N,) attributes of their own type and name, but for the prefix of `write`; list
-        properties, faces and other elements are left out, and named in ``metadata["left_out"]``. ``obj_info num_cols``
-        and ``num_rows`` make the cloud organized; where Stanford's ``range_grid`` lists only the valid points, the
-        other cells are NaN.
+        properties, faces and other elements are left out, and named in ``metadata["left_out"]``; with faces
+        ``metadata["notices"]`` says that it is a mesh. ``obj_info num_cols`` and ``num_rows`` make the cloud organized;
+        where Stanford's ``range_grid`` lists only the valid points, the other cells are NaN.
 
     Raises
     ------
@@ -177,9 +180,11 @@ def _to_cloud(path: str, header: Header, xyz: np.ndarray, attributes: dict[str, 
         if len(words) != 3 or not all(number_of(word) and np.isfinite(float(word)) for word in words):
             raise FormatError(f"{path}: obj_info viewpoint {' '.join(words)!r}; three finite numbers are needed")
         viewpoint = np.array(words, np.float64)
-    metadata = {"ply_comments": tuple(header.comments)} if header.comments else {}
+    metadata: dict[str, Any] = {"ply_comments": tuple(header.comments)} if header.comments else {}
     if left_out := _left_out(header):
         metadata["left_out"] = left_out
+    if num_faces := sum(e.count for e in header.elements if e.name in _FACES):
+        metadata["notices"] = (f"a mesh of {num_faces:,} faces: its vertices are no scan of it; to {OFFER}",)
     return Cloud(xyz, attributes, shape, viewpoint, header.info.get("crs") or None, metadata)
 
 

@@ -7,8 +7,9 @@ import re
 
 import numpy as np
 
+from edgel._objects import COLORS, NORMALS
 from edgel.cloud import Cloud
-from edgel.io.columns import COLORS, NORMALS, flat_attributes, narrowed
+from edgel.io.columns import flat_attributes, narrowed
 from edgel.io.errors import tell
 from edgel.io.files import replacing
 
