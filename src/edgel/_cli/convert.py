@@ -10,10 +10,11 @@ from typing import Annotated
 import typer
 
 from edgel._cli import files, jobs, options
-from edgel._cli.batch import Talk, Told, run_jobs
+from edgel._cli.batch import Talk, run_jobs
 from edgel._cli.compare import differences, read_back
 from edgel._cli.errors import exit_codes
 from edgel._cli.jobs import Job
+from edgel._cli.outcome import Told
 from edgel._cli.output import count
 from edgel._cli.where import Where, take
 

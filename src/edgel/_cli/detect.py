@@ -11,10 +11,11 @@ from typing import Annotated, Any
 
 import edgel
 from edgel._cli import files, jobs, options
-from edgel._cli.batch import Talk, Told, run_jobs
+from edgel._cli.batch import Talk, run_jobs
 from edgel._cli.errors import ExitCode, Failure, exit_codes, failing_as
 from edgel._cli.jobs import Job
 from edgel._cli.methods import check_options, find_edges
+from edgel._cli.outcome import Told
 from edgel._cli.output import renamed
 from edgel._cli.summary import collect, headline, summary
 from edgel._cli.units import unit_of

@@ -11,9 +11,10 @@ import numpy as np
 from rich.table import Table
 
 from edgel._cli import files, jobs, options
-from edgel._cli.batch import Talk, Told, run_jobs
+from edgel._cli.batch import Talk, run_jobs
 from edgel._cli.errors import ExitCode, exit_codes, failing_as
 from edgel._cli.jobs import Job
+from edgel._cli.outcome import Told
 from edgel._cli.output import count, length, print_table, stdout_console
 from edgel._cli.units import unit_of
 from edgel._cli.where import Where, take

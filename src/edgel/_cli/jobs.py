@@ -199,8 +199,8 @@ def check_job(job: Job, reading: files.Reading, part: str | None = None) -> bool
     """
     in_place = False
     if job.output is not None:
-        files.check_output(job.output, no_clobber=job.no_clobber, among=job.among)
         in_place = files.check_in_place(job.output, job.source, reading.intrinsics, part)
+        files.check_output(job.output, no_clobber=job.no_clobber, among=job.among)
     files.check_input(job.source, reading)
     return in_place
 

@@ -11,9 +11,10 @@ import numpy as np
 
 import edgel
 from edgel._cli import files, jobs, options
-from edgel._cli.batch import Talk, Told, run_jobs
+from edgel._cli.batch import Talk, run_jobs
 from edgel._cli.errors import ExitCode, exit_codes, failing_as
 from edgel._cli.jobs import Job
+from edgel._cli.outcome import Told
 from edgel._cli.output import count, renamed, time_rows
 from edgel._cli.where import Where, select
 from edgel._columns import make_room, set_aside

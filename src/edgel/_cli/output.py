@@ -85,7 +85,7 @@ def print_table(title: str, rows: Iterable[tuple[str, ...]], *, console: Console
 
 
 SCHEMA_VERSION = 1
-"""Of what ``--json`` prints (docs/json.md): one more when a field goes or changes meaning, not when one is added."""
+"""Of what ``--json`` prints (docs/command-line.md): one more when a field goes or changes meaning."""
 
 
 def schema(name: str) -> dict[str, Any]:

@@ -8,10 +8,11 @@ from functools import partial
 from typing import Annotated, Any
 
 from edgel._cli import files, jobs, options
-from edgel._cli.batch import Talk, Told, run_jobs
+from edgel._cli.batch import Talk, run_jobs
 from edgel._cli.errors import ExitCode, Failure, exit_codes, failing_as
 from edgel._cli.jobs import Job
 from edgel._cli.methods import arguments, check_options, find_edges
+from edgel._cli.outcome import Told
 from edgel._cli.output import count, time_rows
 from edgel._cli.summary import collect, headline
 from edgel._cli.where import Where

@@ -9,9 +9,9 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
-from edgel._cli.batch import Failed, Told, Work, attempt
 from edgel._cli.errors import ExitCode
 from edgel._cli.jobs import Job
+from edgel._cli.outcome import Failed, Told, Work, attempt
 from edgel._cli.progress import Watch
 from edgel._cli.signals import Terminated, listen
 from edgel._kernels.parallel import num_threads
