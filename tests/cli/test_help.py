@@ -68,7 +68,7 @@ def folder(tmp_path_factory):
     labels = np.where(x + y < 40, 6, 2).astype(np.uint8)
     xyz = np.c_[x, y, 10 - abs(x - 12)] + [637000, 849000, 0]
     scan = edgel.Cloud(xyz, {"classification": labels, **colors})
-    for name in ("scan.ply", "scan.las", "scan.laz", "scan.pcd", "before.laz", "after.laz"):
+    for name in ("scan.ply", "scan.las", "scan.laz", "scan.pcd", "other.laz"):
         io.write(folder / name, scan)
     Image.fromarray(np.tile(np.arange(1000, 1060, dtype=np.uint16), (40, 1))).save(folder / "depth.png")
     (folder / "camera.json").write_text(json.dumps({"fx": 60, "fy": 60, "cx": 30, "cy": 20, "depth_scale": 0.001}))
@@ -77,7 +77,7 @@ def folder(tmp_path_factory):
 
 SHOWN = [line for command in COMMANDS for line in examples(run(command, "--help").stdout)]
 if (ROOT / "README.md").is_file():
-    SHOWN += [line.split("  #")[0] for line in examples((ROOT / "README.md").read_text())]
+    SHOWN += re.findall(r"^\| `(edgel .+?)` \|", (ROOT / "README.md").read_text(), re.MULTILINE)
 LONG = ("edgel view", "edgel demo")  # they wait for someone, or take half a minute; each has tests of its own
 TRIED = [line for line in dict.fromkeys(SHOWN) if not line.startswith(LONG)]
 

@@ -19,12 +19,13 @@ from edgel.io.errors import printable
 _HELP = """Find the edges of 3D point clouds, and their normals, without tuning.
 
 \b
-  edgel info scan.ply                   # what the file holds
-  edgel detect scan.ply -o edges.ply    # its edge points, with kind
-  edgel detect *.laz -o edges/          # of many clouds, into a folder
-  edgel render scan.ply -o edges.png    # a picture of it with its edges
-  edgel view scan.ply                   # look at them in the browser
-  edgel demo                            # two pipe fittings, with a report
+Examples:
+  edgel info scan.ply
+  edgel detect scan.ply -o edges.ply
+  edgel detect *.laz -o edges/
+  edgel render scan.ply -o edges.png
+  edgel view scan.ply
+  edgel demo
 
 Reads PLY, PCD, LAS/LAZ, E57, XYZ/TXT/CSV/ASC/PTS, NPY/NPZ and depth images (PNG, TIFF, NPY); writes all but the images.
 """

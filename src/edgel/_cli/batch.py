@@ -82,7 +82,7 @@ def run_jobs(jobs: Sequence[Job], work: Work, talk: Talk, *, workers: int = 1) -
 def _in_turn(jobs: Sequence[Job], work: Work, watch: Watch) -> Generator[tuple[Job, Told | Failed]]:
     for number, job in enumerate(jobs, 1):
         if len(jobs) > 1:
-            watch.begin(f"{number} of {len(jobs)}, {job.source}")
+            watch.begin(f"{number} of {len(jobs)}", job.source)
         yield job, attempt(work, job, watch)
 
 

@@ -101,7 +101,7 @@ def _convert(wanted: _Wanted, job: Job, progress: Callable[[str], None]) -> Told
     kept = [(f"{job.target}: the format could not keep all", "yellow"), *((f"  {line}", None) for line in lost)]
     return Told(
         facts,
-        headline=f"{job.source}: {count(len(cloud))} points -> {job.target}",
+        headline=f"{job.name}: {count(len(cloud))} points -> {job.target}",
         remarks=kept if lost else [],
         written=[f"{job.target}: {size}"],
     )

@@ -226,9 +226,9 @@ def _detect(wanted: _Wanted, job: Job, progress: Callable[[str], None]) -> Told:
     facts |= {"renamed": aside, **collect(edges, found.not_selected, stages.seconds)}
     return Told(
         facts,
-        title=f"Edges of {job.source}",
+        title=f"Edges of {job.name}",
         rows=summary(edges, found.not_selected, unit, stages.seconds),
-        headline=f"{job.source}: {headline(edges)}" + ("" if job.output is None else f" -> {job.target}"),
+        headline=f"{job.name}: {headline(edges)}" + ("" if job.output is None else f" -> {job.target}"),
         remarks=_remarks(edges, aside),
         written=_written(job, page, label_all=wanted.label_all),
     )

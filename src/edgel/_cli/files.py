@@ -122,7 +122,7 @@ def check_not_input(output: str, inputs: Iterable[str | None], remedy: str = "na
             raise Failure(ExitCode.USAGE, f"{'stdout' if output == PIPE else output}: {same}; {remedy}")
 
 
-def check_in_place(output: str, source: str, intrinsics: str | None, part: str | None = None) -> bool:
+def check_in_place(output: str, source: str, reading: Reading, part: str | None = None) -> bool:
     """Return whether an output is the input itself, or raise a `Failure` where it would hold less than that.
 
     Parameters
@@ -131,11 +131,11 @@ def check_in_place(output: str, source: str, intrinsics: str | None, part: str |
         What would replace the input, and what to do, where that is not every point, as
         `edgel._cli.compare.check_kept` demands.
     """
-    check_not_input(output, [intrinsics])
+    check_not_input(output, [reading.intrinsics])
     formats = [".ply" if path == PIPE else Path(path).suffix.lower() for path in (output, source)]
     if part is not None:
         check_not_input(output, [source], part)
-    elif output == PIPE or intrinsics is not None or formats[0] != formats[1]:
+    elif output == PIPE or reading != Reading() or formats[0] != formats[1]:
         check_not_input(output, [source])
     return is_same_file(output, source)
 

@@ -37,6 +37,11 @@ class Job:
     no_clobber: bool = False
 
     @property
+    def name(self) -> str:
+        """What to call the input."""
+        return "stdin" if self.source == files.PIPE else self.source
+
+    @property
     def target(self) -> str:
         """What to call the output."""
         return "stdout" if self.output == files.PIPE else str(self.output)
@@ -199,7 +204,7 @@ def check_job(job: Job, reading: files.Reading, part: str | None = None) -> bool
     """
     in_place = False
     if job.output is not None:
-        in_place = files.check_in_place(job.output, job.source, reading.intrinsics, part)
+        in_place = files.check_in_place(job.output, job.source, reading, part)
         files.check_output(job.output, no_clobber=job.no_clobber, among=job.among)
     files.check_input(job.source, reading)
     return in_place

@@ -111,9 +111,9 @@ def _estimate(wanted: _Wanted, job: Job, progress: Callable[[str], None]) -> Tol
     }
     return Told(
         facts,
-        title=f"Normals of {job.source}",
+        title=f"Normals of {job.name}",
         rows=[*_rows(facts), *time_rows(stages.seconds)],
-        headline=f"{job.source}: normals of {count(len(cloud) - planes.num_undefined)} points -> {job.target}",
+        headline=f"{job.name}: normals of {count(len(cloud) - planes.num_undefined)} points -> {job.target}",
         remarks=[(renamed(aside), None)] if aside else [],
         written=[f"{job.target}: the whole cloud with nx, ny, nz and variation"],
     )

@@ -39,7 +39,7 @@ class Watch(event.Listener):
         self._bar = Progress(*columns, console=console, transient=True) if console.is_terminal and not quiet else None
         self._task = None if self._bar is None else self._bar.add_task("starting", total=None)
         self._quiet = quiet
-        self._subject, self._stage = "", "starting"
+        self._count, self._name, self._stage = "", "", "starting"
         self._depth = 0  # a kernel that calls another compiles it meanwhile
         self._told = False
         self._began = 0.0
@@ -50,9 +50,9 @@ class Watch(event.Listener):
         self._stage = stage
         self._describe(stage)
 
-    def begin(self, subject: str) -> None:
-        """Show which of several things the stages are of, from now on."""
-        self._subject = f"{subject}: "
+    def begin(self, count: str, name: str = "") -> None:
+        """Show which of several things the stages are of, from now on; where the line is too short its name is cut."""
+        self._count, self._name = f"{count}: ", name and f", {name}"
 
     @contextmanager
     def aside(self) -> Iterator[None]:
@@ -105,4 +105,4 @@ class Watch(event.Listener):
 
     def _describe(self, text: str) -> None:
         if self._bar is not None and self._task is not None:
-            self._bar.update(self._task, description=printable(self._subject + text))
+            self._bar.update(self._task, description=printable(self._count + text + self._name))

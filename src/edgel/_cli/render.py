@@ -144,9 +144,9 @@ def _draw(wanted: _Wanted, job: Job, progress: Callable[[str], None]) -> Told:
     facts = {"input": job.source, "output": output, "width": drawn.shape[1], "height": drawn.shape[0]}
     return Told(
         facts | collect(edges, found.not_selected, stages.seconds),
-        title=f"Picture of {job.source}",
+        title=f"Picture of {job.name}",
         rows=[*rows, *time_rows(stages.seconds)],
-        headline=f"{job.source}: {headline(edges)} -> {output}",
+        headline=f"{job.name}: {headline(edges)} -> {output}",
         written=[f"{output}: the picture, {drawn.shape[1]} x {drawn.shape[0]} pixels"],
     )
 

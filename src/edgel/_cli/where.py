@@ -64,6 +64,15 @@ class Where:
         with np.errstate(invalid="ignore"):
             return _Condition(cloud, quoted).holds(tree)
 
+    def ranges(self, cloud: Cloud) -> list[str]:
+        """Say of the columns of numbers that the condition names what values they have."""
+        tree, quoted = self._parse()
+        named = [node for node in ast.walk(tree) if isinstance(node, ast.Name)]
+        names = dict.fromkeys(quoted.get(node.id, node.id) for node in named)
+        columns = {name: _Condition(cloud, quoted).plain(name) for name in names}
+        finite = {name: values[np.isfinite(values)] for name, values in columns.items() if values.dtype.kind in "iuf"}
+        return [f"{name} goes from {v.min():.9g} to {v.max():.9g}" for name, v in finite.items() if v.size]
+
     def _parse(self) -> tuple[ast.expr, dict[str, str]]:
         """Return the tree of the condition, and the names that stood in backticks by what stands for them there."""
         quoted: dict[str, str] = {}
@@ -106,7 +115,8 @@ def take(cloud: Cloud, where: Where | None) -> Cloud:
 def _some(cloud: Cloud, where: Where) -> np.ndarray:
     mask = where.mask(cloud)
     if not mask.any():
-        raise Failure(ExitCode.DATA, f"--where: of {len(cloud):,} points none has {where.text}")
+        there = "".join(f"; {line}" for line in where.ranges(cloud))
+        raise Failure(ExitCode.DATA, f"--where: of {len(cloud):,} points none has {where.text}{there}")
     return mask
 
 
@@ -220,16 +230,20 @@ class _Condition:
         constant = _constant(node)
         return constant, repr(constant)
 
-    def column(self, name: str, position: int | None) -> tuple[np.ndarray, str]:
+    def plain(self, name: str) -> np.ndarray:
+        """Return a column as it is, (N,) or (N, C)."""
         if name in ("x", "y", "z"):
-            values: np.ndarray = self.cloud.xyz[:, "xyz".index(name)]
-        elif name in self.cloud.attributes:
-            values = self.cloud.attributes[name]
-        else:
-            names = ["x", "y", "z", *self.cloud.attributes]
-            close = difflib.get_close_matches(name.lower(), names, 1)
-            meant = f", perhaps {close[0]}" if close else ""
-            _fail(f"there is no column {name!r}{meant}; there are {', '.join(names)}")
+            return self.cloud.xyz[:, "xyz".index(name)]
+        if name in self.cloud.attributes:
+            return self.cloud.attributes[name]
+        names = ["x", "y", "z", *self.cloud.attributes]
+        close = difflib.get_close_matches(name.lower(), names, 1)
+        meant = f", perhaps {close[0]}" if close else ""
+        _fail(f"there is no column {name!r}{meant}; there are {', '.join(names)}")
+
+    def column(self, name: str, position: int | None) -> tuple[np.ndarray, str]:
+        """Return a column with one value a point, (N,), and what to call it."""
+        values = self.plain(name)
         if values.ndim > 1:
             values = values.reshape(len(values), -1)
             width = values.shape[1]

@@ -74,7 +74,7 @@ def side_by_side(jobs: Sequence[Job], work: Work, watch: Watch, workers: int) ->
             for worker in [worker for worker in busy if worker.pipe in ready]:
                 word = worker.receive()
                 if isinstance(word, str):
-                    watch(f"{jobs[worker.number].source}: {word}")
+                    watch(f"{word}, {jobs[worker.number].source}")
                     continue
                 results[worker.number] = word
                 number = next(left, None)
