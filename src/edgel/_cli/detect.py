@@ -12,11 +12,12 @@ from typing import Annotated, Any
 import edgel
 from edgel._cli import files, jobs, options
 from edgel._cli.batch import Talk, run_jobs
-from edgel._cli.errors import ExitCode, Failure, exit_codes, failing_as
+from edgel._cli.errors import ExitCode, Failure, exit_codes
 from edgel._cli.jobs import Job
 from edgel._cli.methods import check_options, find_edges
 from edgel._cli.outcome import Told
 from edgel._cli.output import renamed
+from edgel._cli.reports import check_report, report_on
 from edgel._cli.summary import collect, headline, summary
 from edgel._cli.units import unit_of
 from edgel._cli.where import Where
@@ -207,7 +208,7 @@ class _Wanted:
 
 
 def _detect(wanted: _Wanted, job: Job, progress: Callable[[str], None]) -> Told:
-    _check_report(job, wanted.reading)
+    check_report(job, wanted.reading)
     in_place = jobs.check_job(job, wanted.reading, None if wanted.label_all else _PART)
     stages, page = Stages(progress), None
     found = find_edges(job.source, wanted.reading, wanted.where, wanted.method, wanted.given, stages)
@@ -257,35 +258,3 @@ def _written(job: Job, page: Path | None, *, label_all: bool) -> list[str]:
     if page is not None:
         lines.append(f"{page}: the report")
     return lines or ["nothing was written; add -o edges.ply to write the edge points"]
-
-
-def _check_report(job: Job, reading: files.Reading) -> None:
-    """Raise a `Failure` for a report that cannot be written, or must not."""
-    if job.report is not None:
-        from edgel._report import file_names  # not at the top: Matplotlib takes time to import
-
-        names = file_names([name_of(job.source)])
-        inputs = [job.source, reading.intrinsics]
-        files.check_new_folder(job.report, names, inputs=inputs, no_clobber=job.no_clobber)
-
-
-def name_of(source: str) -> str:
-    """Return what a report calls an input."""
-    return "stdin" if source == files.PIPE else Path(source).stem
-
-
-def report_on(job: Job, cloud: edgel.Cloud, edges: Edges, directory: str) -> Path:
-    """Write the report of one cloud, compared with what the other detector finds in it, and return its page."""
-    from edgel._report import Case, write_report  # not at the top: Matplotlib takes time to import
-
-    name = name_of(job.source)
-    find_other = edgel.detect if edges.method == options.PAPER else edgel.paper.detect
-    try:
-        other = find_other(cloud)
-    except ValueError:  # what one detector can look at is too little for the other: nothing to compare
-        other = None
-    beside = {"the cloud": job.source, "what was written": job.output}
-    beside = {what: path for what, path in beside.items() if path not in (None, files.PIPE)}
-    with failing_as(ExitCode.OUTPUT, directory):
-        case = Case(name, cloud, edges, other=other, files=beside)
-        return write_report([case], directory, title=f"Edges of {name}")
