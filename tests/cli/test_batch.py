@@ -44,6 +44,7 @@ def scans(tmp_path, monkeypatch):
     for name in ("a.ply", "b.las", "c.npz", ".hidden.ply"):
         io.write(folder / name, roof())
     (folder / "readme.md").write_text("three clouds")
+    (folder / "LICENSE_of_all.txt").write_text("do as you like")
     monkeypatch.chdir(tmp_path)
     return folder
 
@@ -202,7 +203,7 @@ def test_wrong_words_change_nothing(scans, words, message):
     assert result.exit_code == 2
     assert message in result.stderr
     assert sorted(os.listdir()) == ["notes", "scans"]
-    assert written("scans") == [".hidden.ply", "a.ply", "b.las", "c.npz", "readme.md"]
+    assert written("scans") == [".hidden.ply", "LICENSE_of_all.txt", "a.ply", "b.las", "c.npz", "readme.md"]
 
 
 def test_an_output_without_extension_is_a_folder_with_a_slash(scans):

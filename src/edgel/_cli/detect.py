@@ -229,7 +229,7 @@ def _detect(wanted: _Wanted, job: Job, progress: Callable[[str], None]) -> Told:
         facts,
         title=f"Edges of {job.name}",
         rows=summary(edges, found.not_selected, unit, stages.seconds),
-        headline=f"{job.name}: {headline(edges)}" + ("" if job.output is None else f" -> {job.target}"),
+        headline=f"{job.name}: {headline(edges)}{_arrow(job, page)}",
         remarks=_remarks(edges, aside),
         written=_written(job, page, label_all=wanted.label_all),
     )
@@ -248,6 +248,12 @@ def _remarks(edges: Edges, aside: dict[str, str]) -> list[tuple[str, str | None]
         text = "more than half of the points are edges: the cloud may be too sparse for this method"
         remarks.append((text, "yellow"))
     return remarks + ([(renamed(aside), None)] if aside else [])
+
+
+def _arrow(job: Job, page: Path | None) -> str:
+    """Say what was written where, in no more words than the names."""
+    names = [name for name in (None if job.output is None else job.target, page) if name is not None]
+    return f" -> {', '.join(map(str, names))}" if names else ""
 
 
 def _written(job: Job, page: Path | None, *, label_all: bool) -> list[str]:

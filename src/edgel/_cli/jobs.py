@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,8 @@ from edgel._cli import files
 from edgel._cli.compare import check_kept
 from edgel._cli.errors import ExitCode, Failure, failing_as
 from edgel.cloud import Cloud
+
+_DOCUMENT = re.compile(r"(readme|licen[cs]e|copying|changelog|notice).*\.txt$", re.IGNORECASE)  # lies beside clouds
 
 
 @dataclass(frozen=True)
@@ -65,7 +68,7 @@ def _clouds_in(folder: str, reading: files.Reading) -> list[str]:
     wanted = {*images, ".npy"} if reading.intrinsics is not None else set(READERS) - images
     with failing_as(ExitCode.INPUT, folder):
         names = sorted(entry.name for entry in os.scandir(folder) if entry.is_file() and entry.name[0] != ".")
-    chosen = [name for name in names if Path(name).suffix.lower() in wanted]
+    chosen = [name for name in names if Path(name).suffix.lower() in wanted and not _DOCUMENT.match(name)]
     if not chosen:
         left = any(Path(name).suffix.lower() in images for name in names)
         remedy = "give the camera of its depth images with --intrinsics" if left else "name files, or another folder"
