@@ -238,8 +238,10 @@ def test_the_summary_tells_what_is_known_of_the_creases():
     convex = np.where(np.arange(len(edges)) % 2, 1, -1).astype(np.int8)
     kind = np.full(len(edges), edgel.EdgeKind.CREASE, np.uint8)
     rows = {
-        row[0].strip(): row for row in summary(dataclasses.replace(edges, kind=kind, angle=angle, convex=convex), {})
+        row[0].strip(): row
+        for row in summary(dataclasses.replace(edges, kind=kind, angle=angle, convex=convex), 0, "foot", {})
     }
+    assert rows["unit"] == ("unit", "", "foot, says the file")
     assert rows["crease"][2].startswith("median angle 90.0 degrees, ")
     assert "convex" in rows["crease"][2]
     assert "concave" in rows["crease"][2]
@@ -445,8 +447,10 @@ def test_data_that_cannot_be_processed(bad, tmp_path, name, method):
 
 
 def test_folders_are_no_clouds(tmp_path, scan):
-    assert run("info", tmp_path).exit_code == 3
-    assert run("detect", scan, "-o", tmp_path, *PAPER).exit_code == 2
+    result = run("info", tmp_path)
+    assert (result.exit_code, "is a folder without clouds" in result.stderr) == (3, True)
+    (tmp_path / "a.ply").mkdir()
+    assert run("convert", scan, tmp_path / "a.ply" / "b" / "c.ply").exit_code == 5
 
 
 @pytest.mark.parametrize("name", ["out.foo", "out", "out.png"])
@@ -522,12 +526,13 @@ def test_demo(tmp_path):
 
 def test_no_command_shows_help():
     assert "detect" in run().output
+    assert "Exit codes of every command" in run("--help").stdout
     assert run("--version").stdout == f"edgel {edgel.__version__}\n"
     for command in ("detect", "normals", "info", "convert", "render", "demo"):
         page = run(command, "--help").stdout
         assert f"edgel {command}" in page
         assert "Examples:" in page
-        assert "Exit codes" in page
+        assert "Exit codes" not in page  # they are said once
         assert "preset" not in page
 
 

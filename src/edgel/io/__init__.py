@@ -65,6 +65,13 @@ WRITERS: dict[str, Callable[[Any, Cloud], None]] = {
 }
 """Functions ``(path, cloud)`` by extension, lower case."""
 
+MEANT_FOR: dict[str, tuple[str, ...]] = {
+    "intrinsics": (*_DEPTH, ".npy"),
+    "columns": (*_TEXT, ".bin"),
+    "sample_mesh": mesh.EXTENSIONS,
+}
+"""Extensions of the files that each option of `read` is for."""
+
 _NOT_CLOUDS = {
     **dict.fromkeys((".stl", ".off"), f"a mesh, not a point cloud; {mesh.OFFER}"),
     **dict.fromkeys(
@@ -134,18 +141,13 @@ def _read(
 ) -> Cloud:
     if not isinstance(path, (str, os.PathLike)):
         _check_stream(path, "read")
-        _check_use("a stream of PLY", "", intrinsics=intrinsics, columns=columns, sample_mesh=num_points)
+        _check_use("an open file", "", intrinsics=intrinsics, columns=columns, sample_mesh=num_points)
         return ply.read(path)
     extension, name = Path(path).suffix.lower(), printable(path)
     check_readable(path)
     if extension not in READERS and not (num_points is not None and extension in mesh.EXTENSIONS):
         _unknown(path, extension, READERS)
-    if extension not in (*_DEPTH, ".npy"):
-        _check_use(name, f"a depth image ({', '.join(_DEPTH)}, .npy)", intrinsics=intrinsics)
-    if extension not in (*_TEXT, ".bin"):
-        _check_use(name, f"a text ({', '.join(_TEXT)}) or .bin", columns=columns)
-    if extension not in mesh.EXTENSIONS:
-        _check_use(name, f"a mesh ({', '.join(mesh.EXTENSIONS)})", sample_mesh=num_points)
+    _check_use(name, extension, intrinsics=intrinsics, columns=columns, sample_mesh=num_points)
     if num_points is not None:
         return mesh.sample(path, num_points)
     if intrinsics is not None:
@@ -155,12 +157,13 @@ def _read(
     return READERS[extension](path)
 
 
-def _check_use(name: str, wanted: str, **options: Any) -> None:
+def _check_use(name: str, extension: str, **options: Any) -> None:
     """Raise ValueError for options that a file has no use for."""
+    words = {"intrinsics": "depth image", "columns": "text or sweep", "sample_mesh": "mesh"}
     for option, value in options.items():
-        if value is not None:
-            what = f"is no {wanted.removeprefix('a ')}" if wanted else "has no use for them"
-            raise ValueError(f"{option}: {name} {what}; leave them out")
+        if value is not None and extension not in MEANT_FOR[option]:
+            what = f"{words[option]} ({', '.join(MEANT_FOR[option])})"
+            raise ValueError(f"{option}: {name} is no {what}; name another file, or leave the option out")
 
 
 def write(path: str | os.PathLike[str] | BinaryIO, cloud: Cloud) -> None:
