@@ -64,11 +64,10 @@ def convert(
     """Convert clouds from any format to any other."""
     with exit_codes(as_json=as_json, debug=debug):
         files.check_stdout(output, as_json=as_json)
-        wanted = _Wanted(
-            files.Reading(intrinsics, columns, sample_mesh), None if where is None else Where(where), check
-        )
+        reading = files.Reading(intrinsics, columns, sample_mesh)
+        wanted = _Wanted(reading, None if where is None else Where(where), check)
         extension = options.extension(output_format)
-        todo = jobs.plan(sources, wanted.reading, output=output, extension=extension, clobber=clobber)
+        todo = jobs.plan(sources, reading, output=output, extension=extension, clobber=clobber)
         run_jobs(todo, partial(_convert, wanted), Talk("convert", as_json, quiet, debug), workers=workers)
 
 

@@ -181,12 +181,11 @@ def detect(
         if label_all and output is None:
             raise Failure(ExitCode.USAGE, "--all: says what -o writes; add -o OUT")
         files.check_stdout(output, as_json=as_json)
+        reading = files.Reading(intrinsics, columns, sample_mesh)
         condition = None if where is None else Where(where)
-        wanted = _Wanted(
-            files.Reading(intrinsics, columns, sample_mesh), condition, method, given, min_angle, crop, label_all
-        )
+        wanted = _Wanted(reading, condition, method, given, min_angle, crop, label_all)
         extension = options.extension(output_format)
-        todo = jobs.plan(sources, wanted.reading, output=output, extension=extension, report=report, clobber=clobber)
+        todo = jobs.plan(sources, reading, output=output, extension=extension, report=report, clobber=clobber)
         run_jobs(todo, partial(_detect, wanted), Talk("detect", as_json, quiet, debug), workers=workers)
 
 

@@ -34,6 +34,8 @@ def view(
         list[str], typer.Argument(metavar="IN", help="The clouds to show, side by side, and folders of them.")
     ],
     intrinsics: options.Intrinsics = None,
+    columns: options.Columns = None,
+    sample_mesh: options.SampleMesh = None,
     host: Annotated[
         str,
         options.own(
@@ -69,14 +71,15 @@ def view(
             raise Failure(ExitCode.USAGE, f"the viewer needs viser, which is not there ({error}); {remedy}") from error
         if port is not None and not 0 < port < 65536:
             raise Failure(ExitCode.USAGE, f"--port: expected 1 to 65535, got {port}")
-        clouds = expand(sources, files.Reading(intrinsics))
+        reading = files.Reading(intrinsics, columns, sample_mesh)
+        clouds = expand(sources, reading)
         if host not in _LOCAL:
             print_line(
                 f"--host {host}: whoever learns the page's address can see the clouds and press every button",
                 style="yellow",
             )
         try:
-            serve(clouds, host=host, port=port, intrinsics=intrinsics, open_browser=browser, ready=_tell)
+            serve(clouds, host=host, port=port, reading=reading.given, open_browser=browser, ready=_tell)
         except OSError as error:
             where = f"{host}:{port}" if port else host
             remedy = "choose another --port, or leave it out" if port else "choose another --host, or leave it out"

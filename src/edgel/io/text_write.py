@@ -9,9 +9,10 @@ import numpy as np
 
 from edgel._objects import COLORS, NORMALS
 from edgel.cloud import Cloud
-from edgel.io.columns import flat_attributes, narrowed
+from edgel.io.columns import flat_attributes, narrowed, plain_name
 from edgel.io.errors import tell
 from edgel.io.files import replacing
+from edgel.io.names import standard_names
 
 # Columns that come first, as far as they are there.
 _FIRST = (COLORS, NORMALS)
@@ -53,7 +54,8 @@ def write(path: str | os.PathLike[str], cloud: Cloud) -> None:
     suffix = os.path.splitext(path)[1].lower()
     separator = "," if suffix == ".csv" else " "
     said: dict[str, str] = {}
-    columns = flat_attributes(cloud, said, spell=lambda name: re.sub(r"[,;#/\"']", "_", name))
+    spelled = standard_names([plain_name(name) for name in cloud.attributes])  # as every reader of texts takes them
+    columns = flat_attributes(cloud, said, spell=lambda name: spelled.get(name, re.sub(r"[,;#/\"']", "_", name)))
     columns = {name: columns[name] for group in _FIRST if {*group} <= {*columns} for name in group} | columns
     if suffix == ".pts":
         columns = _known_to_pts(columns, said)
