@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from edgel._neighbors.normals import Normals
     from edgel.cloud import Cloud
     from edgel.edges import EdgeKind, Edges
-    from edgel.io import FormatError, read, write
+    from edgel.io import FormatError, FormatWarning, read, write
 
 __version__ = "0.1.0.dev0"
 
@@ -21,6 +21,7 @@ __all__ = [
     "EdgeKind",
     "Edges",
     "FormatError",
+    "FormatWarning",
     "Intrinsics",
     "Normals",
     "detect",
@@ -38,6 +39,7 @@ _HOMES = {
     "EdgeKind": "edgel.edges",
     "Edges": "edgel.edges",
     "FormatError": "edgel.io",
+    "FormatWarning": "edgel.io",
     "Intrinsics": "edgel._intrinsics",
     "Normals": "edgel._neighbors.normals",
     "detect": "edgel._detect",

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from edgel._kernels.parallel import kernel, run_slices
+from edgel._objects import take_apart
 
 LARGEST = 1e30
 """Largest coordinate, in magnitude: squares of distances stay far from overflow and offsets fit single precision. In
@@ -137,20 +138,16 @@ def as_cloud(points: Any) -> Cloud:
 
     Parameters
     ----------
-    points : Cloud, (N, 3) or (H, W, 3) array_like, or an object with ``.xyz`` or ``.points``
-        Objects of laspy (``.xyz``), Open3D and PyVista (``.points``) are understood.
+    points : Cloud, (N, 3) or (H, W, 3) array_like, records with x, y and z, or an object that carries points
+        See `edgel._objects.take_apart` for the objects of other libraries that are understood; their attributes come
+        along.
 
     Raises
     ------
     TypeError, ValueError
         If it carries no numeric coordinates of shape (N, 3) or (H, W, 3).
     """
-    if isinstance(points, Cloud):
-        return points
-    for attribute in ("xyz", "points"):
-        if not isinstance(points, np.ndarray) and hasattr(points, attribute):
-            return Cloud(unmasked(getattr(points, attribute), "points"))
-    return Cloud(points)
+    return points if isinstance(points, Cloud) else Cloud(*take_apart(points))
 
 
 def check_points(points: Any, *, minimum: int = 3) -> Points:
@@ -167,7 +164,8 @@ def check_points(points: Any, *, minimum: int = 3) -> Points:
     TypeError, ValueError
         If `points` carries no coordinates, or fewer than `minimum` finite ones, or one beyond `LARGEST`.
     """
-    xyz = as_cloud(points).xyz
+    cloud = as_cloud(points)
+    xyz = cloud.xyz
     # Kernels, not BLAS: its threads would spin for a while on the cores that ours need next.
     state = np.empty(len(xyz), np.uint8)
     run_slices(_look, len(xyz), xyz, state, size=65536)
@@ -176,11 +174,9 @@ def check_points(points: Any, *, minimum: int = 3) -> Points:
     if (state == _LARGE).any():
         _check_size(xyz, rows, "points")
     if len(rows) < minimum:
-        found = (
-            f"{len(rows)} finite points of {len(as_cloud(points))}" if len(rows) < len(as_cloud(points)) else len(rows)
-        )
+        found = f"{len(rows)} finite points of {len(cloud)}" if len(rows) < len(cloud) else len(rows)
         raise ValueError(f"points: needs at least {minimum} points with finite coordinates, got {found}")
-    return Points(np.ascontiguousarray(xyz), rows, len(as_cloud(points)))
+    return Points(np.ascontiguousarray(xyz), rows, len(cloud))
 
 
 @kernel

@@ -238,8 +238,10 @@ def test_the_summary_tells_what_is_known_of_the_creases():
     convex = np.where(np.arange(len(edges)) % 2, 1, -1).astype(np.int8)
     kind = np.full(len(edges), edgel.EdgeKind.CREASE, np.uint8)
     rows = {
-        row[0].strip(): row for row in summary(dataclasses.replace(edges, kind=kind, angle=angle, convex=convex), {})
+        row[0].strip(): row
+        for row in summary(dataclasses.replace(edges, kind=kind, angle=angle, convex=convex), 0, "foot", {})
     }
+    assert rows["unit"] == ("unit", "", "foot, says the file")
     assert rows["crease"][2].startswith("median angle 90.0 degrees, ")
     assert "convex" in rows["crease"][2]
     assert "concave" in rows["crease"][2]
@@ -359,21 +361,20 @@ def test_convert_says_what_is_lost(tmp_path):
     io.write(tmp_path / "a.ply", cloud)
     result = run("convert", tmp_path / "a.ply", tmp_path / "a.xyz")
     assert result.exit_code == 0
-    assert "organized rows and columns: left out" in result.stderr
-    assert "viewpoint: left out" in result.stderr
+    assert "organized rows and columns, viewpoint: left out" in result.stderr
     assert "left out" not in run("convert", tmp_path / "a.ply", tmp_path / "a.xyz", "--no-check").stderr
 
 
 def test_differences_of_a_copy():
     cloud = edgel.Cloud(step(), {"a": np.arange(2500), "b": np.zeros((2500, 2))})
     copy = edgel.Cloud(step() + 0.25, {"a": np.arange(2500) + 1, "b_0": np.zeros(2500), "b_1": np.zeros(2500)})
-    assert differences(cloud, copy) == [
-        "coordinates: rounded, by 0.25 at most",
-        "a: values changed",
-        "b: split into b_0 to b_1",
-    ]
-    assert differences(cloud, copy.take(np.arange(7))) == ["points: 7 of 2,500"]
-    assert differences(cloud, cloud) == []
+    assert differences(cloud, copy) == {
+        "coordinates": "rounded, by 0.25 at most",
+        "a": "values changed",
+        "b": "split into b_0 to b_1",
+    }
+    assert differences(cloud, copy.take(np.arange(7))) == {"points": "7 of 2,500"}
+    assert differences(cloud, cloud) == {}
 
 
 @pytest.mark.parametrize("command", ["detect", "normals", "convert"])
@@ -445,8 +446,10 @@ def test_data_that_cannot_be_processed(bad, tmp_path, name, method):
 
 
 def test_folders_are_no_clouds(tmp_path, scan):
-    assert run("info", tmp_path).exit_code == 3
-    assert run("detect", scan, "-o", tmp_path, *PAPER).exit_code == 2
+    result = run("info", tmp_path)
+    assert (result.exit_code, "is a folder without clouds" in result.stderr) == (3, True)
+    (tmp_path / "a.ply").mkdir()
+    assert run("convert", scan, tmp_path / "a.ply" / "b" / "c.ply").exit_code == 5
 
 
 @pytest.mark.parametrize("name", ["out.foo", "out", "out.png"])
@@ -522,12 +525,13 @@ def test_demo(tmp_path):
 
 def test_no_command_shows_help():
     assert "detect" in run().output
+    assert "Exit codes of every command" in run("--help").stdout
     assert run("--version").stdout == f"edgel {edgel.__version__}\n"
     for command in ("detect", "normals", "info", "convert", "render", "demo"):
         page = run(command, "--help").stdout
         assert f"edgel {command}" in page
         assert "Examples:" in page
-        assert "Exit codes" in page
+        assert "Exit codes" not in page  # they are said once
         assert "preset" not in page
 
 

@@ -151,6 +151,9 @@ def make_seeds(malformed: Path | None = None) -> dict[str, list[tuple[str, bytes
         "text": [(suffix, raw) for suffix, raws in TEXTS.items() for raw in raws],
         "png": [(".png", raw) for raw in _images(".png")],
         "tiff": [(".tif", raw) for raw in _images(".tif")],
+        "obj": [(".obj", b"v 0 0 1 1 0 0\nv 1 0 1 0 1 0\nv 0 1 1 0 0 1\nvn 0 0 1\nvn 0 0 1\nvn 0 1 0\nvt 0 0\n")],
+        "bin": [(".bin", np.random.default_rng(0).random((20, columns), np.float32).tobytes()) for columns in (4, 20)],
+        "yaml": [(".yaml", b"image_width: 640\nK: [20, 0, 8, 0, 20, 6, 0, 0, 1]\nD: [0.0, 0.0]\n")],
         "intrinsics": [(".json", CAMERA), (".json", b'{"camera_matrix": {"data": [20, 0, 8, 0, 20, 6, 0, 0, 1]}}')],
     }
     try:

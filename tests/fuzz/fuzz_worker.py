@@ -36,7 +36,7 @@ def _memory(key: str) -> int:
 
 
 def _read(path: Path) -> None:
-    if path.suffix == ".json":
+    if path.suffix in (".json", ".yaml"):
         read_intrinsics(path)
     elif path.suffix in (".png", ".tif"):
         read(path, intrinsics=CAMERA_OF_SEEDS)

@@ -11,6 +11,7 @@ import warnings
 import zipfile
 import zlib
 from contextlib import suppress
+from typing import Any
 
 import laspy
 import numpy as np
@@ -31,7 +32,7 @@ def refused(file, match, content=None):
     """The file is refused with the message, quickly, in little memory, without warnings and prints."""
     if content is not None:
         file.write_bytes(content)
-    options = {"intrinsics": CAMERA} if file.suffix in (".png", ".tif") else {}
+    options: dict[str, Any] = {"intrinsics": CAMERA} if file.suffix in (".png", ".tif") else {}
     tracemalloc.start()
     started = time.process_time()
     try:

@@ -7,7 +7,7 @@ import pytest
 from test_io_support import assert_same, rich_cloud
 
 from edgel import Cloud
-from edgel.io import READERS, WRITERS, FormatError, read, write
+from edgel.io import READERS, WRITERS, FormatError, FormatWarning, read, write
 from edgel.io.files import describe, replacing
 
 HELD = [suffix for suffix in WRITERS if suffix != ".e57"]
@@ -57,7 +57,8 @@ def test_renamed_files_say_what_they_are(tmp_path, suffix, other):
     ("suffix", "message"),
     [
         (".stl", "a mesh"),
-        (".obj", "sample it first"),
+        (".off", "--sample-mesh"),
+        (".glb", "save it as"),
         (".STEP", "CAD model"),
         (".mcap", "ROS"),
         (".foo", r"known: \.ply"),
@@ -76,6 +77,8 @@ def test_unknown_extensions(tmp_path, suffix, message):
 def test_upper_case_extensions_and_output_over_the_input(tmp_path, suffix):
     file = tmp_path / f"a{suffix.upper()}"
     cloud = rich_cloud()
+    if suffix == ".pts":  # which has no place for the rest
+        cloud = Cloud(cloud.xyz, {name: cloud.attributes[name] for name in ("red", "green", "blue")})
     write(file, cloud)
     first = read(file)
     write(file, first)
@@ -88,7 +91,7 @@ def test_upper_case_extensions_and_output_over_the_input(tmp_path, suffix):
 def test_a_failed_write_leaves_the_old_file(tmp_path, suffix):
     file = tmp_path / f"a{suffix}"
     file.write_bytes(b"old")
-    with pytest.raises(FormatError):
+    with pytest.raises(FormatWarning):  # warnings are errors here, and come before anything is written
         write(file, Cloud(np.eye(3), {"x": np.array(["a", "b", "c"], dtype=object)}))
     assert file.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [file]
@@ -149,6 +152,10 @@ def test_every_shared_cloud_reads(shared_data):
     for file in shared_data.rglob("*"):
         if file.suffix.lower() in READERS and "malformed" not in file.parts and file.name != "missingheader.pcd":
             if file.name == "published.csv" or file.name.startswith(("LICENSE", "README")):
+                continue
+            if file.suffix == ".obj":
+                with pytest.raises(FormatError, match=r"a mesh of .* faces"):
+                    read(file)
                 continue
             count += len(read(file)) > 0
     assert count > 40

@@ -1,4 +1,5 @@
 import struct
+import warnings
 from contextlib import suppress
 
 import laspy
@@ -9,7 +10,7 @@ from hypothesis import strategies as st
 from test_io_support import assert_same, clouds, rich_cloud
 
 from edgel import Cloud
-from edgel.io import FormatError, read, write
+from edgel.io import FormatError, FormatWarning, read, write
 
 SUFFIXES = [".las", ".laz"]
 
@@ -71,8 +72,12 @@ def test_extra_dimensions_are_kept_as_declared(tmp_path, suffix):
 @given(clouds(finite=True), st.sampled_from(SUFFIXES))
 def test_any_cloud_round_trips(tmp_path_factory, cloud, suffix):
     file = tmp_path_factory.mktemp("las") / f"a{suffix}"
-    write(file, cloud)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        write(file, cloud)
     found = read(file)
+    said = getattr(caught[0].message, "said", {}) if caught else {}
+    assert set(said) == {name for name in ("intensity",) if f"{name}_exact" in found.attributes}
     extent = np.ptp(cloud.xyz, axis=0)
     # The finest power of ten for which the extent fits 31 bits: half a step is lost at most.
     allowed = np.maximum(extent * 1e-8, np.spacing(np.abs(cloud.xyz).max(axis=0)) * 8) + 1e-15
@@ -90,7 +95,8 @@ def test_crs_and_attributes_of_another_format(tmp_path, crs, suffix):
     cloud = Cloud(
         cloud.xyz + [4e5, 5.8e6, 0], {**cloud.attributes, "intensity": np.linspace(0, 1, 60)}, None, None, crs
     )
-    write(tmp_path / f"a{suffix}", cloud)
+    with pytest.warns(FormatWarning, match="intensity: renamed intensity_exact"):
+        write(tmp_path / f"a{suffix}", cloud)
     found = read(tmp_path / f"a{suffix}")
     assert found.crs == crs
     assert np.abs(found.xyz - cloud.xyz).max() < 1e-6
@@ -123,9 +129,26 @@ def test_holes_are_refused_with_the_remedy(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_long_names_are_refused(tmp_path):
-    with pytest.raises(FormatError, match="at most 32 bytes"):
-        write(tmp_path / "a.las", Cloud(np.eye(3), {"a" * 33: np.arange(3)}))
+@pytest.mark.parametrize(
+    "name",
+    [
+        "a" * 33,
+        "a" * 31 + "\u00e4" * 9,
+        "X",
+        "z",
+        "nor:normalX",
+        *("bit_fields", "classification_flags", "flag_byte", "num_returns", "pt_src_id"),
+    ],
+)
+def test_names_that_las_cannot_have_are_renamed_and_said(tmp_path, name):
+    cloud = Cloud(np.eye(3), {name: np.array([7, 2**60 + 1, 9]), name[:1] * 32: np.arange(3)})
+    with pytest.warns(FormatWarning) as caught:
+        write(tmp_path / "a.las", cloud)
+    found = read(tmp_path / "a.las")
+    (new,) = [key for key, values in found.attributes.items() if values.tolist() == [7, 2**60 + 1, 9]]
+    assert getattr(caught[0].message, "said", {})[name].startswith(f"renamed {new}")
+    np.testing.assert_array_equal(found.attributes[name[:1] * 32], np.arange(3))
+    assert len(new.encode()) <= 32
 
 
 def test_a_panic_of_the_decoder_is_a_format_error(airborne, monkeypatch):

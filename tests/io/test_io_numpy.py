@@ -11,7 +11,7 @@ from PIL import Image
 from test_io_support import assert_same, clouds, rich_cloud
 
 from edgel import Cloud
-from edgel.io import FormatError, Intrinsics, read, read_intrinsics, write
+from edgel.io import FormatError, FormatWarning, Intrinsics, read, read_intrinsics, write
 
 CAMERA = Intrinsics(fx=100, fy=200, cx=2, cy=1)
 DEPTH = np.array([[0, 1000, 2000, 3000, 4000]] * 3, np.uint16)
@@ -87,9 +87,18 @@ def test_bad_arrays(tmp_path):
         other.writestr("readme.txt", "hello")
     with pytest.raises(FormatError, match="its arrays are none"):
         read(archive)
-    for name in ("xyz", "shape"):
-        with pytest.raises(FormatError, match="rename"):
-            write(archive, Cloud(np.eye(3), {name: np.zeros(3)}))
+
+
+@pytest.mark.parametrize(("suffix", "name"), [(".npz", "xyz"), (".npz", "shape"), (".npz", "file"), (".npz", "a\0b"),
+                                              (".npy", "x"), (".npy", "Z"), (".npy", "")])  # fmt: skip
+def test_names_that_mean_something_else_are_renamed_and_said(tmp_path, suffix, name):
+    cloud = Cloud(np.eye(3), {name: np.arange(3), "o": np.array([{}] * 3, object), "t": np.array(["a", "b", "c"])})
+    with pytest.warns(FormatWarning, match=r"renamed.*; o: left out, it holds Python objects"):
+        write(tmp_path / f"a{suffix}", cloud)
+    found = read(tmp_path / f"a{suffix}")
+    first, text = found.attributes.values()
+    assert (first.tolist(), text.tolist()) == ([0, 1, 2], ["a", "b", "c"])
+    np.testing.assert_array_equal(found.xyz, cloud.xyz)
 
 
 def test_promise_of_a_trillion_points_is_not_believed(tmp_path):
@@ -206,7 +215,7 @@ def test_depth_images_without_or_with_wrong_camera(tmp_path):
         read(tmp_path / "a.png", intrinsics=Intrinsics(1, 1, 1, 1, width=640, height=480))
     (tmp_path / "a.intr").write_text("{}")
     (tmp_path / "b.intr").write_text("{}")
-    with pytest.raises(FormatError, match="2 intrinsics files"):
+    with pytest.raises(FormatError, match="2 files of cameras"):
         read(tmp_path / "a.png")
     np.save(tmp_path / "wide.npy", np.ones((20, 30)))
     with pytest.raises(FormatError, match="depth image needs its camera"):

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from test_io_support import assert_same, clouds, rich_cloud
 
 from edgel import Cloud
-from edgel.io import FormatError, read, write
+from edgel.io import FormatError, FormatWarning, read, write
 from edgel.io.lzf import lzf_decompress
 
 HEADER = """# .PCD v0.7 - Point Cloud Data file format
@@ -41,18 +41,90 @@ def lzf_literals(raw):
 @given(clouds())
 def test_round_trip(tmp_path_factory, cloud):
     file = tmp_path_factory.mktemp("pcd") / "a.pcd"
+    with np.errstate(over="ignore"):
+        cloud = Cloud(cloud.xyz.astype(np.float32), cloud.attributes)
     write(file, cloud)
     assert_same(read(file), cloud, dtypes=False)
+
+
+def fields_of(file):
+    return {line.split()[0]: line.split()[1:] for line in file.read_bytes().split(b"DATA")[0].decode().splitlines()}
+
+
+def test_coordinates_are_float32_which_pcl_reads(tmp_path):
+    cloud = Cloud(np.array([[0.1, -20.3, 1e4], [np.nan, 1, 2]]))
+    write(tmp_path / "a.pcd", cloud)  # nothing to say: single precision is finer than any sensor here
+    assert fields_of(tmp_path / "a.pcd")["SIZE"] == ["4"] * 3
+    np.testing.assert_array_equal(read(tmp_path / "a.pcd").xyz, cloud.xyz.astype(np.float32))
+
+
+def test_large_coordinates_are_shifted_and_come_back(tmp_path):
+    xyz = np.random.default_rng(0).uniform([5e5, 5.6e6, 90], [5.01e5, 5.601e6, 300], (50, 3)).round(3)
+    xyz[7, 1] = np.nan
+    cloud = Cloud(xyz, viewpoint=np.array([500500.0, 5600500, 1000]))
+    with pytest.warns(FormatWarning, match=r"coordinates: counted from 500500 5600500 0.*rounded.*2e-05 at most"):
+        write(tmp_path / "a.pcd", cloud)
+    fields = fields_of(tmp_path / "a.pcd")
+    assert (fields["SIZE"], fields["VIEWPOINT"][:3]) == (["4"] * 3, ["0", "0", "1000"])
+    found = read(tmp_path / "a.pcd")
+    np.testing.assert_allclose(found.xyz, xyz, rtol=0, atol=1.6e-5)
+    assert found.viewpoint is not None
+    assert found.viewpoint.tolist() == [500500, 5600500, 1000]
+    # Written once more, part of it too, it is the same.
+    with pytest.warns(FormatWarning, match="counted from 500500 5600500 0"):
+        write(tmp_path / "b.pcd", found.take(np.arange(9)))
+    np.testing.assert_array_equal(read(tmp_path / "b.pcd").xyz, found.xyz[:9])
+    broken = (tmp_path / "a.pcd").read_bytes().replace(b"edgel shift 500500", b"edgel shift 5005k0")
+    with pytest.raises(FormatError, match="three finite numbers"):
+        read_text(tmp_path, broken)
+
+
+@pytest.mark.parametrize(
+    ("xyz", "said"), [([[-3e4, 0.1, 0], [3e4, 0, 0]], "rounded"), ([[1e300, 0.1, 0]], "double precision")]
+)
+def test_what_no_shift_mends_is_said(tmp_path, xyz, said):
+    with pytest.warns(FormatWarning, match=f"coordinates: .*{said}"):
+        write(tmp_path / "a.pcd", Cloud(np.array(xyz)))
+    np.testing.assert_allclose(read(tmp_path / "a.pcd").xyz, xyz, rtol=1e-7)
+
+
+def test_names_and_types_of_pcl(tmp_path):
+    attributes = {name: np.array([0.5, 1, 2], np.float32) for name in ("nx", "ny", "nz")}
+    attributes |= {"intensity": np.arange(3, dtype=np.uint16), "label": np.arange(3), "far": np.array([0, 1, 2**40])}
+    cloud = Cloud(
+        np.eye(3), {**attributes, **{name: np.arange(3, dtype=np.uint16) for name in ("red", "green", "blue")}}
+    )
+    write(tmp_path / "a.pcd", cloud)
+    fields = fields_of(tmp_path / "a.pcd")
+    assert fields["FIELDS"] == ["x", "y", "z", "normal_x", "normal_y", "normal_z", "intensity", "label", "far", "rgb"]
+    assert list(map("".join, zip(fields["TYPE"], fields["SIZE"], strict=True))) == ["F4"] * 7 + ["U4", "I8", "F4"]
+    assert_same(read(tmp_path / "a.pcd"), cloud, dtypes=False)
+    both = Cloud(np.eye(3), {**attributes, "normal_x": np.arange(3)})
+    write(tmp_path / "b.pcd", both)
+    assert_same(read(tmp_path / "b.pcd"), both, dtypes=False)
+
+
+@pytest.mark.parametrize("name", ["rgb", "rgba", "_", "X"])
+def test_names_that_pcd_reads_otherwise_are_renamed_and_said(tmp_path, name):
+    with pytest.warns(FormatWarning, match=f"{name}: renamed {name}_2"):
+        write(tmp_path / "a.pcd", Cloud(np.eye(3), {name: np.arange(3)}))
+    assert read(tmp_path / "a.pcd").attributes[f"{name}_2"].tolist() == [0, 1, 2]
+
+
+def test_one_column_is_no_grid(tmp_path):
+    write(tmp_path / "a.pcd", Cloud(np.eye(3), shape=(3, 1)))
+    assert (fields_of(tmp_path / "a.pcd")["WIDTH"], fields_of(tmp_path / "a.pcd")["HEIGHT"]) == (["3"], ["1"])
 
 
 def test_round_trip_keeps_types_shape_viewpoint(tmp_path):
     cloud = rich_cloud(shape=(6, 7), holes=True)
     view = (1.0, 2.5, 3.0, 0.5, 0.5, 0.5, 0.5)
-    cloud = Cloud(cloud.xyz, cloud.attributes, (6, 7), np.array(view[:3]), None, {"pcd_viewpoint": view})
+    xyz = cloud.xyz.astype(np.float32)
+    cloud = Cloud(xyz, cloud.attributes, (6, 7), np.array(view[:3]), None, {"pcd_viewpoint": view})
     write(tmp_path / "a.pcd", cloud)
     found = read(tmp_path / "a.pcd")
     assert_same(found, cloud, dtypes=False)
-    for code in ("i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f4", "f8"):
+    for code in ("i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8"):
         assert found.attributes[f"a_{code}"].dtype == np.dtype(code)
     assert found.attributes["normal"].shape == (42, 3)
     assert found.shape == (6, 7)

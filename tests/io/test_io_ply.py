@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from test_io_support import assert_same, clouds, rich_cloud
 
 from edgel import Cloud
-from edgel.io import FormatError, ply, read, write
+from edgel.io import FormatError, FormatWarning, ply, read, write
 
 HEADER = "ply\nformat {} 1.0\n{}end_header\n"
 XYZ = "property float x\nproperty float y\nproperty float z\n"
@@ -40,14 +40,14 @@ def test_round_trip_keeps_types_shape_viewpoint_crs(tmp_path):
     write(tmp_path / "a.ply", cloud)
     found = read(tmp_path / "a.ply")
     assert_same(found, cloud, dtypes=False)
-    for code in ("i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8"):
-        assert found.attributes[f"a_{code}"].dtype == np.dtype(code)
-    assert {f"a_{c}": found.attributes[f"a_{c}"].dtype.str for c in ("bool", "i8", "u8", "f2")} == {
-        "a_bool": "|u1",
-        "a_i8": "<i4",
-        "a_u8": "<i4",
-        "a_f2": "<f4",
-    }
+    # The four types that Open3D reads.
+    for codes, stored in [
+        (("bool", "u1"), "u1"),
+        (("i1", "i2", "u2", "i4", "u4", "i8", "u8"), "i4"),
+        (("f2", "f4"), "f4"),
+    ]:
+        assert {found.attributes[f"a_{code}"].dtype.str[1:] for code in codes} == {stored}
+    assert found.attributes["a_f8"].dtype == np.float64
     assert found.shape == (6, 7)
     assert found.viewpoint is not None
     assert found.viewpoint.tolist() == [0.1, 2, 3]
@@ -55,7 +55,7 @@ def test_round_trip_keeps_types_shape_viewpoint_crs(tmp_path):
     assert found.metadata["ply_comments"] == ("hello",)
 
 
-@pytest.mark.parametrize(("value", "code"), [(2**31, "u4"), (2**53, "f8"), (-(2**53), "f8")])
+@pytest.mark.parametrize(("value", "code"), [(2**31 - 1, "i4"), (2**31, "f8"), (2**53, "f8"), (-(2**53), "f8")])
 def test_64_bit_integers_find_an_exact_type(value, code):
     file = BytesIO()
     write(file, Cloud(np.zeros((1, 3)), {"id": np.array([value], np.int64)}))
@@ -64,9 +64,12 @@ def test_64_bit_integers_find_an_exact_type(value, code):
     assert int(found[0]) == value
 
 
-def test_integers_beyond_2_to_53_are_refused_not_rounded():
-    with pytest.raises(FormatError, match=r"write \.npz"):
-        write(BytesIO(), Cloud(np.zeros((1, 3)), {"id": np.array([2**53 + 1])}))
+@pytest.mark.parametrize("id", [np.array([2**53 + 1]), np.array([2**63 + 1], np.uint64), np.array([-(2**53) - 1])])
+def test_integers_beyond_2_to_53_are_left_out_not_rounded(id):
+    file = BytesIO()
+    with pytest.warns(FormatWarning, match=r"id: left out.*\.npz holds it"):
+        write(file, Cloud(np.zeros((1, 3)), {"id": id, "label": np.array([7])}))
+    assert {name: v.tolist() for name, v in read_bytes(file.getvalue()).attributes.items()} == {"label": [7]}
 
 
 @pytest.mark.parametrize(("xyz", "kind"), [([[0.5, 1, 2]], b"property float x"), ([[0.1, 1, 2]], b"property double x")])
@@ -83,7 +86,8 @@ def test_plyfile_reads_ours(tmp_path):
     np.testing.assert_array_equal(np.column_stack([vertex[axis] for axis in "xyz"]), cloud.xyz)
     for name, values in cloud.attributes.items():
         if values.ndim == 1:
-            np.testing.assert_array_equal(vertex[name], values)
+            known = name in ("red", "green", "blue")
+            np.testing.assert_array_equal(vertex[name if known else f"scalar_{name}"], values)
 
 
 @pytest.mark.parametrize("order", ["<", ">", "="])
@@ -228,14 +232,37 @@ def test_bad_words_name_their_line():
         read_bytes(ply_bytes(b"1 2 3 300\n", f"element vertex 1\n{XYZ}property uchar a\n"))
 
 
-def test_two_columns_of_one_name_are_refused():
-    points = np.zeros((2, 3))
-    with pytest.raises(FormatError, match="rename"):
-        write(BytesIO(), Cloud(points, {"X": np.zeros(2)}))
-    with pytest.raises(FormatError, match="rename"):
-        write(BytesIO(), Cloud(points, {"n": np.zeros((2, 2)), "n_0": np.zeros(2)}))
-    with pytest.raises(FormatError, match="not numbers"):
-        write(BytesIO(), Cloud(points, {"name": np.array(["a", "b"])}))
+@pytest.mark.parametrize(
+    ("attributes", "said", "names"),
+    [
+        ({"X": np.zeros(2)}, {"X": "renamed X_2"}, ["X_2"]),
+        ({"n_0": np.ones(2), "n": np.zeros((2, 2))}, {"n": "renamed n_2"}, ["n_0", "n_2_0", "n_2_1"]),
+        ({"n": np.zeros((2, 2)), "n_0": np.ones(2)}, {"n_0": "renamed n_0_2"}, ["n_0", "n_1", "n_0_2"]),
+        ({"name": np.array(["a", "b"]), "k": np.zeros(2)}, {"name": "left out, <U1 is no type of numbers"}, ["k"]),
+        ({"t": np.zeros(2, "M8[s]"), "c": np.zeros(2, complex)}, {"t": "left out", "c": "left out"}, []),
+        ({"a\0b": np.zeros(2), "\ud800": np.ones(2), "": np.ones(2)}, {"": "renamed __2"}, ["a_b", "_", "__2"]),
+    ],
+)
+def test_what_has_no_place_is_left_out_or_renamed_and_said(attributes, said, names):
+    file = BytesIO()
+    with pytest.warns(FormatWarning) as caught:
+        write(file, Cloud(np.zeros((2, 3)), attributes))
+    found = caught[0].message
+    assert isinstance(found, FormatWarning)
+    assert caught[0].filename == __file__
+    assert found.said.keys() == said.keys()
+    assert all(found.said[name].startswith(what) for name, what in said.items())
+    assert list(read_bytes(file.getvalue()).attributes) == names
+
+
+def test_the_prefix_is_taken_off_our_own_files_only():
+    file = BytesIO()
+    cloud = Cloud(np.eye(3), {name: np.arange(3.0) for name in ("label", "scalar_label", "nx", "intensity", "scalar_")})
+    write(file, cloud)
+    assert_same(read_bytes(file.getvalue()), cloud)
+    theirs = file.getvalue().replace(b"obj_info prefix scalar_\n", b"")
+    names = ["scalar_label", "scalar_scalar_label", "nx", "intensity", "scalar_scalar_"]
+    assert list(read_bytes(theirs).attributes) == names
 
 
 def test_truncated_scan_says_how_many_are_there(shared_data):

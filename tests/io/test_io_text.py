@@ -21,7 +21,7 @@ def read_text(tmp_path, text, suffix=".txt"):
 
 
 @settings(max_examples=60)
-@given(clouds(), st.sampled_from(SUFFIXES))
+@given(clouds(), st.sampled_from([suffix for suffix in SUFFIXES if suffix != ".pts"]))
 def test_round_trip(tmp_path_factory, cloud, suffix):
     file = tmp_path_factory.mktemp("text") / f"a{suffix}"
     write(file, cloud)
@@ -30,6 +30,8 @@ def test_round_trip(tmp_path_factory, cloud, suffix):
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_round_trip_of_a_rich_cloud(tmp_path, suffix):
+    if suffix == ".pts":
+        pytest.skip("PTS holds intensity and colors only")
     cloud = rich_cloud(holes=True)
     write(tmp_path / f"a{suffix}", cloud)
     found = read(tmp_path / f"a{suffix}")
@@ -111,7 +113,7 @@ def test_integers_are_exact_and_may_become_floats_late(tmp_path):
         ("x y z\n1 2 3\n4 5 6 7\n", "line 3: expected 3 numbers"),
         ("1 2\n3 4\n", "x, y and z are needed"),
         ("1\n2\n3\n", "expected|needed|declared"),
-        ("E,N,H\n1,2,3\n", "the columns are E, N, H"),
+        ("A,B,C\n1,2,3\n", "the columns are A, B, C"),
         ("x y z\n1 2 3 4\n", "the header .* names 3 columns, line 2 has 4"),
         ("3\n1 2 3\n4 5 6\n", "declared 3 points in its first line, found 2"),
         ("# only\n# remarks\n", "no line of numbers"),

@@ -24,7 +24,8 @@ def test_saved_edges_are_those_of_detect(open_session, hall_file, extension, tmp
     (tmp_path / name).write_bytes(content)
     written, cloud = edgel.read(tmp_path / name), edgel.read(hall_file)
     edges = edgel.detect(cloud)
-    np.testing.assert_array_equal(written.xyz, cloud.xyz[edges.index])
+    single = extension == ".pcd"  # the only precision that PCL reads
+    np.testing.assert_allclose(written.xyz, cloud.xyz[edges.index], rtol=1e-7 if single else 0)
 
 
 def test_picture_shows_what_is_seen(open_session, hall_file):

@@ -12,30 +12,40 @@ from typer.exceptions import TyperException
 
 import edgel
 from edgel._cli import convert, demo, detect, info, normals, render, view
+from edgel._cli.help import Command, help_text, without_type
 from edgel._cli.methods import MethodCommand
-from edgel._cli.options import help_text
 from edgel.io.errors import printable
 
 _HELP = """Find the edges of 3D point clouds, and their normals, without tuning.
 
 \b
-  edgel info scan.ply                   what the file holds
-  edgel detect scan.ply -o edges.ply    its edge points, with kind and normal
-  edgel render scan.ply -o edges.png    a picture of it with its edges
-  edgel view scan.ply                   look at them in the browser
-  edgel demo                            two pipe fittings, with a report
+Examples:
+  edgel info scan.ply
+  edgel detect scan.ply -o edges.ply
+  edgel detect *.laz -o edges/
+  edgel render scan.ply -o edges.png
+  edgel view scan.ply
+  edgel demo
 
-Reads PLY, PCD, LAS/LAZ, E57, XYZ/TXT/CSV/ASC/PTS, NPY/NPZ and depth images (PNG, TIFF, NPY); writes all but the images.
+Reads PLY, PCD, LAS/LAZ, E57, XYZ/TXT/CSV/ASC/PTS, PTX, NPY/NPZ, BIN (KITTI, nuScenes), OBJ of points, depth images
+(PNG, TIFF, NPY), and samples meshes (PLY, OBJ, STL, OFF); writes PLY, PCD, LAS/LAZ, E57, texts and NPY/NPZ.
 """
 _EPILOG = (
-    "Exit codes: 0 done, 1 an error inside edgel, 2 wrong usage, 3 the input cannot be read, 4 its data cannot be "
-    "processed, 5 the output cannot be written, 130 interrupted, "
-    "143 terminated."
+    "Exit codes of every command: 0 done, 1 an error inside edgel, 2 wrong usage, 3 the input cannot be read, 4 its "
+    "data cannot be processed, 5 the output cannot be written, 130 interrupted, 143 terminated; of several inputs that "
+    "of the first that failed."
 )
 
 
 class Commands(TyperGroup):
     """The commands; wrong words, as of a shell that put a file's name in their place, are shown and not obeyed."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Return the options before the command's name."""
+        params = super().get_params(ctx)
+        for param in params:
+            without_type(param)
+        return params
 
     def make_context(self, *args: Any, **extra: Any) -> Any:
         """Read the words before the command's name."""
@@ -82,10 +92,10 @@ def main(
     """Find the edges of 3D point clouds."""
 
 
-app.command(cls=MethodCommand, help=help_text(detect.HELP), epilog=_EPILOG)(detect.detect)
-app.command(help=help_text(view.HELP), epilog=_EPILOG)(view.view)
-app.command(help=help_text(normals.HELP), epilog=_EPILOG)(normals.normals)
-app.command(help=help_text(info.HELP), epilog=_EPILOG)(info.info)
-app.command(help=help_text(convert.HELP), epilog=_EPILOG)(convert.convert)
-app.command(cls=MethodCommand, help=help_text(render.HELP), epilog=_EPILOG)(render.render)
-app.command(help=help_text(demo.HELP), epilog=_EPILOG)(demo.demo)
+app.command(cls=MethodCommand, help=help_text(detect.HELP))(detect.detect)
+app.command(cls=Command, help=help_text(view.HELP))(view.view)
+app.command(cls=Command, help=help_text(normals.HELP))(normals.normals)
+app.command(cls=Command, help=help_text(info.HELP))(info.info)
+app.command(cls=Command, help=help_text(convert.HELP))(convert.convert)
+app.command(cls=MethodCommand, help=help_text(render.HELP))(render.render)
+app.command(cls=Command, help=help_text(demo.HELP))(demo.demo)

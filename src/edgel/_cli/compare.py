@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+import re
 import tempfile
+import warnings
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +17,7 @@ from edgel._cli.errors import ExitCode, Failure, failing_as
 from edgel._cli.output import count, length
 from edgel.cloud import Cloud
 from edgel.io.columns import as_table
+from edgel.io.errors import FormatWarning
 
 
 def read_back(output: str, cloud: Cloud) -> Cloud:
@@ -27,7 +31,9 @@ def read_copy(output: str, cloud: Cloud) -> Cloud:
 
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / ("stdout.ply" if output == files.PIPE else Path(output).name)
-        io.write(copy, cloud)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FormatWarning)  # the comparison tells the same
+            io.write(copy, cloud)
         return io.read(copy)
 
 
@@ -47,57 +53,82 @@ def check_kept(output: str, original: Cloud, cloud: Cloud) -> None:
         kept = read_copy(output, cloud)
     lost = differences(cloud, kept)
     for name, value in original.metadata.items():
-        if name != "left_out" and not (name in kept.metadata and _same(value, kept.metadata[name])):
-            lost.append(f"{name}: left out")
+        if name not in ("left_out", "notices") and not (name in kept.metadata and _same(value, kept.metadata[name])):
+            lost[name] = "left out"
     if lost:
-        what = "; ".join(lost)
+        what = "; ".join(FormatWarning(output, lost).lines())
         raise Failure(
             ExitCode.OUTPUT, f"{output}: is the input itself, and would hold less than now ({what}); name another file"
         )
 
 
-def differences(cloud: Cloud, kept: Cloud) -> list[str]:
-    """Say what of a cloud, and of the file it was read from, its copy has not kept, one sentence each.
+def told_once(cloud: Cloud, said: Mapping[str, str], found: Mapping[str, str]) -> dict[str, str]:
+    """Return what a writer said of a cloud, which knows why, and what the comparison found besides."""
+    parts = {re.sub(r"_\d+$", "", name) for name in said if name not in cloud.attributes}  # said column by column
+    return {**said, **{name: what for name, what in found.items() if name not in said and name not in parts}}
+
+
+def differences(cloud: Cloud, kept: Cloud) -> dict[str, str]:
+    """Say what of a cloud, and of the file it was read from, its copy has not kept, by its name.
 
     Examples
     --------
     >>> import numpy as np
     >>> cloud = Cloud(np.eye(3), {"label": np.array([1, 2, 3])})
     >>> differences(cloud, Cloud(np.eye(3)))
-    ['label: left out']
+    {'label': 'left out'}
     """
-    lost = []
+    lost: dict[str, str] = {}
     if len(kept) != len(cloud):
-        return [f"points: {count(len(kept))} of {count(len(cloud))}"]
-    same = np.isnan(kept.xyz) & np.isnan(cloud.xyz) | (kept.xyz == cloud.xyz)
+        return {"points": f"{count(len(kept))} of {count(len(cloud))}"}
+    with np.errstate(invalid="ignore"):
+        close = np.abs(kept.xyz - cloud.xyz) <= 4 * np.spacing(np.abs(cloud.xyz))  # decimals of a LAS grid, as doubles
+    same = np.isnan(kept.xyz) & np.isnan(cloud.xyz) | (kept.xyz == cloud.xyz) | close
     if not same.all():
         shift = np.abs(kept.xyz - cloud.xyz)[~same].max()
-        lost.append(f"coordinates: rounded, by {length(float(shift))} at most" if np.isfinite(shift) else "coordinates")
+        lost["coordinates"] = f"rounded, by {length(float(shift))} at most" if np.isfinite(shift) else "changed"
     for name, values in cloud.attributes.items():
-        lost += _attribute(name, values, kept)
+        what = _attribute(name, values, kept, cloud.attributes)
+        lost |= {} if what is None else {name: what}
     for name in ("shape", "viewpoint", "crs"):
         if getattr(cloud, name) is not None and getattr(kept, name) is None:
-            lost.append({"shape": "organized rows and columns"}.get(name, name) + ": left out")
-    return lost + [f"{what}: left out" for what in cloud.metadata.get("left_out", ())]
+            lost["organized rows and columns" if name == "shape" else name] = "left out"
+    return lost | dict.fromkeys([*cloud.metadata.get("left_out", ()), *_extended_records(cloud, kept)], "left out")
 
 
-def _attribute(name: str, values: np.ndarray, kept: Cloud) -> list[str]:
+def _extended_records(cloud: Cloud, kept: Cloud) -> list[str]:
+    """Name the extended records (EVLR) of a LAS file that a copy has not, but for COPC's, which order its points."""
+    found, copies = (
+        [(evlr.user_id, evlr.record_id) for evlr in getattr(c.metadata.get("las_header"), "evlrs", None) or ()]
+        for c in (cloud, kept)
+    )
+    return [f"extended record (EVLR) {user} {number}" for user, number in found if (user, number) not in copies]
+
+
+def _attribute(name: str, values: np.ndarray, kept: Cloud, names: Collection[str]) -> str | None:
+    """Say what a copy has not kept of an attribute, None where all; `names` are the original's attributes."""
     columns = as_table(values)
-    if name in kept.attributes:
+    split = [f"{name}_{i}" for i in range(columns.shape[1] if values.ndim > 1 else 0)]
+    if split and not set(split) - set(kept.attributes):
+        parts = [kept.attributes[part] for part in split]
+    elif name in kept.attributes:
         parts = [kept.attributes[name]]
-    elif values.ndim > 1 and all(f"{name}_{i}" in kept.attributes for i in range(columns.shape[1])):
-        parts = [kept.attributes[f"{name}_{i}"] for i in range(columns.shape[1])]
     elif f"{name}_exact" in kept.attributes:
         parts = [kept.attributes[f"{name}_exact"]]
     else:
-        return [f"{name}: left out"]
+        others = (
+            other for other in kept.attributes if other not in names and _same_column(kept.attributes[other], values)
+        )
+        other = next(others, None)
+        return "left out" if other is None else f"renamed {other}"
     copy = np.column_stack([as_table(part) for part in parts])
-    numbers = values.dtype.kind == "f" and copy.dtype.kind == "f"
-    if copy.shape != columns.shape or not np.array_equal(copy, columns, equal_nan=numbers):
-        return [f"{name}: values changed"]
-    if len(parts) > 1:
-        return [f"{name}: split into {name}_0 to {name}_{len(parts) - 1}"]
-    return []
+    if copy.shape != columns.shape or not _same_column(copy, columns):
+        return "values changed"
+    return f"split into {name}_0 to {name}_{len(parts) - 1}" if len(parts) > 1 else None
+
+
+def _same_column(copy: np.ndarray, values: np.ndarray) -> bool:
+    return np.array_equal(copy, values, equal_nan=values.dtype.kind == "f" and copy.dtype.kind == "f")
 
 
 def _same(value: Any, other: Any) -> bool:

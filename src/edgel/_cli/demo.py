@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-import typer
 from rich.table import Table as RichTable
 
-from edgel._cli import files
+from edgel._cli import files, options
 from edgel._cli.errors import ExitCode, exit_codes, failing_as
-from edgel._cli.options import Debug, NoClobber
 from edgel._cli.output import stdout_console
 from edgel._cli.progress import Watch
 
@@ -31,16 +29,41 @@ Examples:
 """
 
 
+_FOLDER = "edgel-demo"
+
+
 def demo(
     directory: Annotated[
-        str, typer.Option("-o", "--output", metavar="DIR", help="The folder to write into; made if it is not there.")
-    ] = "edgel-demo",
+        str,
+        options.own(
+            "-o",
+            "--output",
+            text="The folder to write into; made if it is not there.",
+            group=options.OUTPUT,
+            metavar="DIR",
+            default=_FOLDER,
+        ),
+    ] = _FOLDER,
     num_points: Annotated[
         int | None,
-        typer.Option(help="Points of each scan. [dim]\\[default: as many as in the paper][/dim]", show_default=False),
+        options.own(
+            "--num-points",
+            text="Points of each scan.",
+            group="Scans",
+            metavar="COUNT",
+            default="as many as in the paper",
+        ),
     ] = None,
-    no_clobber: NoClobber = False,
-    debug: Debug = False,
+    clobber: Annotated[
+        bool,
+        options.own(
+            "--clobber/--no-clobber",
+            text="Replace files that are there already, or none.",
+            group=options.OUTPUT,
+            default="clobber",
+        ),
+    ] = True,
+    debug: options.Debug = False,
 ) -> None:
     """Repeat the published experiment."""
     with exit_codes(debug=debug):
@@ -48,7 +71,7 @@ def demo(
             watch("starting")
             from edgel._demo import file_names, run_demo  # not at the top: Matplotlib takes time to import
 
-            files.check_new_folder(directory, file_names(), inputs=(), no_clobber=no_clobber)
+            files.check_new_folder(directory, file_names(), inputs=(), no_clobber=not clobber)
 
             with failing_as(ExitCode.OUTPUT, directory, ["num_points"]):
                 done = run_demo(directory, num_points=num_points, progress=watch)

@@ -7,10 +7,11 @@ import traceback
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from enum import IntEnum
+from typing import Any
 
 import typer
 
-from edgel._cli.output import StdoutError, print_json, print_line
+from edgel._cli.output import StdoutError, print_json, print_line, schema
 from edgel._cli.signals import Terminated
 from edgel.io.errors import describe_error, printable
 
@@ -61,14 +62,14 @@ def failing_as(code: ExitCode, subject: str, options: Collection[str] = ()) -> I
         raise
     except MemoryError as error:
         remedy = "thin the cloud or cut it into parts, or use a machine with more memory"
-        raise Failure(code, _about(subject, f"not enough memory; {remedy}")) from error
+        raise Failure(code, about(subject, f"not enough memory; {remedy}")) from error
     except (ValueError, TypeError, ImportError, OSError) as error:
         message = describe_error(error)
         # The library's messages begin with the arguments that they are about.
         names, colon, rest = message.partition(": ")
         if colon and set(names.split(", ")) <= set(options):
             raise Failure(ExitCode.USAGE, f"{', '.join(map(as_option, names.split(', ')))}: {rest}") from error
-        raise Failure(code, _about(subject, rest if names == "points" else message)) from error
+        raise Failure(code, about(subject, rest if names == "points" else message)) from error
 
 
 @contextmanager
@@ -94,25 +95,45 @@ def exit_codes(*, as_json: bool = False, debug: bool = False) -> Iterator[None]:
         if error.is_closed:
             raise typer.Exit(int(ExitCode.OUTPUT)) from error
         code, message, as_json = ExitCode.OUTPUT, str(error), False
-    except Failure as failure:
-        code, message = failure.code, str(failure)
-        _show_traceback(debug)
-    except MemoryError:
-        code, message = ExitCode.DATA, "not enough memory; thin the cloud or cut it into parts"
-        _show_traceback(debug)
     except Exception as error:
-        code = ExitCode.INTERNAL
-        advice = "please report it with what --debug shows"
-        what = f"{type(error).__name__}: {printable(error, 400)}"
-        message = f"an error inside edgel, not of your data ({what}); {advice}"
-        _show_traceback(debug)
+        code, message = verdict(error)
+        if debug:
+            show_traceback(traceback.format_exc())
     else:
         return
-    print_line(f"edgel: {message}", style="bold red")
+    tell(message)
     if as_json:
         with suppress(StdoutError):
-            print_json({"error": message, "code": int(code)})
+            print_json(error_facts(None, code, message))
     raise typer.Exit(int(code))
+
+
+def verdict(error: Exception) -> tuple[ExitCode, str]:
+    """Return the exit code and the message of an error, whatever it is."""
+    if isinstance(error, Failure):
+        return error.code, str(error)
+    if isinstance(error, MemoryError):
+        return ExitCode.DATA, "not enough memory; thin the cloud or cut it into parts"
+    what = f"{type(error).__name__}: {printable(error, 400)}"
+    return (
+        ExitCode.INTERNAL,
+        f"an error inside edgel, not of your data ({what}); please report it with what --debug shows",
+    )
+
+
+def tell(message: str) -> None:
+    """Print an error on stderr."""
+    print_line(f"edgel: {message}", style="bold red")
+
+
+def error_facts(source: str | None, code: ExitCode, message: str) -> dict[str, Any]:
+    """Return what ``--json`` prints of an error, of one input or of the command."""
+    return {**schema("error"), "input": source, "code": int(code), "error": message}
+
+
+def show_traceback(text: str) -> None:
+    """Print a traceback on stderr."""
+    sys.stderr.writelines(printable(line, 10_000) + "\n" for line in text.splitlines())
 
 
 def as_option(name: str) -> str:
@@ -126,11 +147,7 @@ def as_option(name: str) -> str:
     return "--" + name.replace("_", "-")
 
 
-def _about(subject: str, message: str) -> str:
+def about(subject: str, message: str) -> str:
+    """Put what a message is about before it, unless it names it itself."""
     subject = printable(subject)
     return message if not subject or subject in message else f"{subject}: {message}"
-
-
-def _show_traceback(debug: bool) -> None:
-    if debug:
-        sys.stderr.writelines(printable(line, 10_000) + "\n" for line in traceback.format_exc().splitlines())

@@ -6,11 +6,13 @@ import os
 import stat
 import sys
 import tempfile
+import warnings
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
-from edgel._cli.errors import ExitCode, Failure, failing_as
+from edgel._cli.errors import ExitCode, Failure, as_option, failing_as
 from edgel.cloud import Cloud
 
 if TYPE_CHECKING:
@@ -20,32 +22,56 @@ if TYPE_CHECKING:
 PIPE = "-"
 
 
-def check_input(path: str, intrinsics: str | None = None) -> None:
+@dataclass(frozen=True)
+class Reading:
+    """How inputs are to be read.
+
+    Attributes
+    ----------
+    intrinsics : str or None
+        The file of the camera of depth images.
+    columns : str or None
+        Names of the columns of texts, commas between.
+    sample_mesh : int or None
+        Points to sample from meshes.
+    """
+
+    intrinsics: str | None = None
+    columns: str | None = None
+    sample_mesh: int | None = None
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """What was asked for, by the name of the argument of `edgel.read`."""
+        return {name: value for name, value in vars(self).items() if value is not None}
+
+
+def check_input(path: str, reading: Reading) -> None:
     """Raise a `Failure` for an input that cannot be read, before anything else happens."""
     from edgel.io.files import check_readable
 
     if path == PIPE:
         if sys.stdin.isatty():
             raise Failure(ExitCode.USAGE, "IN is -, and no file is piped in; use `edgel ... - < cloud.ply`, or name it")
-        if intrinsics is not None:
-            raise Failure(ExitCode.USAGE, "--intrinsics: the pipe carries PLY, which needs none; name the depth image")
+        for name in reading.given:
+            raise Failure(ExitCode.USAGE, f"{as_option(name)}: the pipe carries PLY of points; name the file instead")
         return
     with failing_as(ExitCode.INPUT, path):
         check_readable(path)
-    if intrinsics is not None:
-        with failing_as(ExitCode.INPUT, intrinsics):
-            check_readable(intrinsics)
+    if reading.intrinsics is not None:
+        with failing_as(ExitCode.INPUT, reading.intrinsics):
+            check_readable(reading.intrinsics)
 
 
-def read_cloud(path: str, intrinsics: str | None = None) -> Cloud:
+def read_cloud(path: str, reading: Reading = Reading()) -> Cloud:
     """Read a cloud, PLY from stdin when the path is ``-``."""
     from edgel import io  # not at the top: `edgel --help` reads nothing
 
-    with failing_as(ExitCode.INPUT, "stdin" if path == PIPE else path, ["intrinsics"]):
-        return io.read(sys.stdin.buffer) if path == PIPE else io.read(path, intrinsics=intrinsics)
+    with failing_as(ExitCode.INPUT, "stdin" if path == PIPE else path, reading.given):
+        return io.read(sys.stdin.buffer if path == PIPE else path, **reading.given)
 
 
-def check_output(path: str, *, no_clobber: bool = False) -> None:
+def check_output(path: str, *, no_clobber: bool = False, among: bool = False) -> None:
     """Raise a `Failure` for an output that could not be written, before the long work rather than after it."""
     from edgel.io import WRITERS
 
@@ -55,27 +81,37 @@ def check_output(path: str, *, no_clobber: bool = False) -> None:
                 ExitCode.USAGE, "the output is -, a binary PLY, and stdout is the terminal; pipe it, or name a file"
             )
         return
-    if os.path.isdir(path):
-        raise Failure(ExitCode.USAGE, f"{path}: is a folder; name the file, as in {os.path.join(path, 'edges.ply')}")
     check_extension(path, WRITERS)
-    check_file(path, no_clobber=no_clobber)
+    check_file(path, no_clobber=no_clobber, among=among)
 
 
-def check_file(path: str, *, no_clobber: bool) -> None:
-    """Raise a `Failure` for a file that cannot, or with --no-clobber must not, be replaced or made."""
+def check_stdout(output: str | None, *, as_json: bool) -> None:
+    """Raise a `Failure` where a cloud and JSON would both go to stdout."""
+    if as_json and output == PIPE:
+        raise Failure(ExitCode.USAGE, "--json: stdout carries the cloud already; name a file to write it into")
+
+
+def check_file(path: str, *, no_clobber: bool, among: bool = False) -> None:
+    """Raise a `Failure` for a file that cannot, or with `no_clobber` must not, be replaced or made.
+
+    With `among` its folder may yet have to be made, and those above it.
+    """
     from edgel.io.files import check_replaceable
 
+    if os.path.isdir(path):
+        raise Failure(ExitCode.OUTPUT, f"{path}: is a folder, where a file was to be; remove it, or choose another")
     check_clobber(path, no_clobber=no_clobber)
     with failing_as(ExitCode.OUTPUT, path):
         old = check_replaceable(path)
     if old is None or stat.S_ISREG(old.st_mode):  # nothing is made beside a pipe or a device
-        check_folder(path, Path(os.path.realpath(path)).parent if os.path.islink(path) else Path(path).parent)
+        folder = Path(os.path.realpath(path) if os.path.islink(path) else path).parent
+        check_folder(path, _nearest(folder) if among else folder)
 
 
 def check_clobber(path: str | os.PathLike[str], *, no_clobber: bool) -> None:
-    """Raise a `Failure` for a file that is there already, with --no-clobber."""
+    """Raise a `Failure` for a file that is there already, where those are to stay."""
     if no_clobber and os.path.isfile(path):
-        raise Failure(ExitCode.OUTPUT, f"{path}: is there already; name another file, or leave out --no-clobber")
+        raise Failure(ExitCode.OUTPUT, f"{path}: is there already; choose another name, or add --clobber")
 
 
 def is_same_file(output: str, source: str) -> bool:
@@ -98,20 +134,20 @@ def check_not_input(output: str, inputs: Iterable[str | None], remedy: str = "na
             raise Failure(ExitCode.USAGE, f"{'stdout' if output == PIPE else output}: {same}; {remedy}")
 
 
-def check_in_place(output: str, source: str, intrinsics: str | None, *, whole: bool = True) -> bool:
+def check_in_place(output: str, source: str, reading: Reading, part: str | None = None) -> bool:
     """Return whether an output is the input itself, or raise a `Failure` where it would hold less than that.
 
     Parameters
     ----------
-    whole : bool
-        Whether every point will be written, as `edgel._cli.compare.check_kept` demands then.
+    part : str or None
+        What would replace the input, and what to do, where that is not every point, as
+        `edgel._cli.compare.check_kept` demands.
     """
-    check_not_input(output, [intrinsics])
+    check_not_input(output, [reading.intrinsics])
     formats = [".ply" if path == PIPE else Path(path).suffix.lower() for path in (output, source)]
-    if not whole:
-        remedy = "the edge points alone would replace it: name another file, or add --all, which keeps every point"
-        check_not_input(output, [source], remedy)
-    elif output == PIPE or intrinsics is not None or formats[0] != formats[1]:
+    if part is not None:
+        check_not_input(output, [source], part)
+    elif output == PIPE or reading != Reading() or formats[0] != formats[1]:
         check_not_input(output, [source])
     return is_same_file(output, source)
 
@@ -120,9 +156,9 @@ def check_extension(path: str, known: Iterable[str]) -> None:
     """Raise a `Failure` for a file whose extension names no format."""
     extension = Path(path).suffix.lower()
     if extension not in known:
-        what = (
-            f"{extension!r} is no format that edgel writes" if extension else "has no extension, which tells the format"
-        )
+        what = f"{extension!r} is no format that edgel writes"
+        if not extension:
+            what = f"has no extension, which tells the format; write {path}/ for a folder"
         raise Failure(ExitCode.USAGE, f"{path}: {what}; known: {' '.join(known)}")
 
 
@@ -142,6 +178,11 @@ def check_folder(path: str, folder: Path) -> None:
         raise Failure(ExitCode.OUTPUT, f"{path}: {folder} {what}") from error
 
 
+def _nearest(folder: Path) -> Path:
+    """Return a folder, or the first above it that is there."""
+    return next(parent for parent in (folder, *folder.parents) if parent.exists())
+
+
 def check_new_folder(path: str, files: re.Pattern[str], *, inputs: Iterable[str | None], no_clobber: bool) -> None:
     """Raise a `Failure` for a folder that cannot be made or written, or where a file must not be replaced.
 
@@ -153,18 +194,33 @@ def check_new_folder(path: str, files: re.Pattern[str], *, inputs: Iterable[str 
         What the command reads.
     """
     folder, inputs = Path(path), list(inputs)
-    check_folder(path, next(parent for parent in (folder, *folder.parents) if parent.exists()))
+    check_folder(path, _nearest(folder))
     for file in sorted(folder.glob("*")):
         if files.fullmatch(file.name):
             check_not_input(str(file), inputs, "name another folder")
             check_file(str(file), no_clobber=no_clobber)
 
 
-def write_cloud(path: str, cloud: Cloud, *, no_clobber: bool = False) -> None:
-    """Write a cloud, PLY to stdout when the path is ``-``."""
-    from edgel import io
+def write_cloud(path: str, cloud: Cloud, *, no_clobber: bool = False) -> dict[str, str]:
+    """Write a cloud, PLY to stdout when the path is ``-``, and return what became of what the format cannot hold."""
+    from edgel.io import FormatWarning
 
     check_clobber(path, no_clobber=no_clobber)  # once more: the work took its time
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", FormatWarning)
+        _write(path, cloud)
+    said: dict[str, str] = {}
+    for warning in caught:
+        if isinstance(warning.message, FormatWarning):
+            said |= warning.message.said
+        else:
+            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
+    return said
+
+
+def _write(path: str, cloud: Cloud) -> None:
+    from edgel import io
+
     if path != PIPE:
         with failing_as(ExitCode.OUTPUT, path):
             io.write(path, cloud)

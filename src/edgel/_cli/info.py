@@ -3,28 +3,37 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 from rich.table import Table
 
-from edgel._cli import files, options
+from edgel._cli import files, jobs, options
+from edgel._cli.batch import Talk, run_jobs
 from edgel._cli.errors import ExitCode, exit_codes, failing_as
-from edgel._cli.output import count, length, print_json, print_table, stdout_console
-from edgel._cli.progress import Watch
+from edgel._cli.jobs import Job
+from edgel._cli.outcome import Told, notices
+from edgel._cli.output import count, length, print_table, stdout_console
+from edgel._cli.units import unit_of
+from edgel._cli.where import Where, take
 from edgel._neighbors.kdtree import bounds, build_index
 from edgel._neighbors.knn import knn
 from edgel._neighbors.queries import at_points, every_point
 from edgel.cloud import Cloud, check_points
 
-HELP = """Say what a file holds: points, extent, spacing, fields, and what may surprise (NaN, duplicates).
+HELP = """Say what files hold: points, extent, spacing, fields, and what may surprise (NaN, duplicates).
 
-Lengths are in the cloud's unit. The spacing is the median distance from a point to the nearest one elsewhere.
+Lengths are in the cloud's unit, which is named where the file tells it. The spacing is the median distance from a point
+to the nearest one elsewhere.
 
 \b
 Examples:
   edgel info scan.laz
   edgel info scan.ply --json
+  edgel info *.laz
+  edgel info scan.las --where "classification == 2"
   edgel info depth.png --intrinsics camera.json
 """
 
@@ -32,24 +41,34 @@ _SAMPLE = 200_000  # points whose nearest neighbour is looked for; the median ne
 
 
 def info(
-    source: options.Input,
+    sources: options.Inputs,
+    where: options.Where = None,
     intrinsics: options.Intrinsics = None,
+    columns: options.Columns = None,
+    sample_mesh: options.SampleMesh = None,
     as_json: options.AsJson = False,
     debug: options.Debug = False,
 ) -> None:
-    """Say what a file holds."""
+    """Say what files hold."""
     with exit_codes(as_json=as_json, debug=debug):
-        files.check_input(source, intrinsics)
-        with Watch() as watch:
-            watch("reading")
-            cloud = files.read_cloud(source, intrinsics)
-            watch("looking at the points")
-            with failing_as(ExitCode.DATA, source):
-                facts = {"input": source, **describe(cloud)}
-        if as_json:
-            print_json(facts)
-        else:
-            show(facts)
+        reading = files.Reading(intrinsics, columns, sample_mesh)
+        work = partial(_describe, reading, None if where is None else Where(where))
+        run_jobs(jobs.plan(sources, reading), work, Talk("info", as_json, debug=debug, show=_show))
+
+
+def _describe(reading: files.Reading, where: Where | None, job: Job, progress: Callable[[str], None]) -> Told:
+    files.check_input(job.source, reading)
+    progress("reading")
+    cloud = take(files.read_cloud(job.source, reading), where)
+    progress("looking at the points")
+    with failing_as(ExitCode.DATA, job.source):
+        return Told({"input": job.source, "unit": unit_of(cloud, job.source), **describe(cloud)})
+
+
+def _show(told: Told, among: bool) -> None:
+    show(told.facts)
+    if among:
+        stdout_console().print()
 
 
 def describe(cloud: Cloud) -> dict[str, Any]:
@@ -67,6 +86,8 @@ def describe(cloud: Cloud) -> dict[str, Any]:
         "fields": [describe_field(name, values) for name, values in cloud.attributes.items()],
         "viewpoint": cloud.viewpoint,
         "crs": cloud.crs,
+        "left_out": cloud.metadata.get("left_out", ()),
+        "notices": notices(cloud),
     }
 
 
@@ -134,13 +155,16 @@ def overview(facts: dict[str, Any]) -> list[tuple[str, ...]]:
         rows.append(("duplicates", count(facts["duplicates"]), "points at the place of another" + sample))
     if facts["spacing"] is not None:
         rows.append(("spacing", length(facts["spacing"]), "from a point to the nearest, median" + sample))
+    if facts["unit"] is not None:
+        rows.append(("unit", "", f"{facts['unit']}, says the file"))
     if facts["viewpoint"] is not None:
         rows.append(("viewpoint", " ".join(length(value) for value in facts["viewpoint"])))
     if facts["crs"] is not None:
         # WKT is long, its first name says which system it is; all of it is in the JSON.
         name = re.search(r'"([^"]+)"', facts["crs"])
         rows.append(("crs", "", name.group(1) if name else facts["crs"]))
-    return rows
+    rows += [("left out", "", what) for what in facts["left_out"]]
+    return rows + [("notice", "", what) for what in facts["notices"]]
 
 
 def number(value: Any) -> str:

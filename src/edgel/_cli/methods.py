@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from typer.core import TyperCommand
+import numpy as np
 
 import edgel
 from edgel._cli import files
 from edgel._cli.errors import ExitCode, Failure, as_option, exit_codes, failing_as
+from edgel._cli.help import Command
 from edgel._cli.options import METHODS, PAPER
+from edgel._cli.where import Where, select
 from edgel._stages import Stages
 from edgel.edges import Edges, as_kinds
 
 
-class MethodCommand(TyperCommand):
+class MethodCommand(Command):
     """A command with ``--method``, which says so to those who ask for the published method as they once had to."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -58,13 +61,44 @@ def check_options(method: str, given: dict[str, Any]) -> dict[str, Any]:
     return given
 
 
+@dataclass(frozen=True)
+class Found:
+    """The edges of a cloud that was read.
+
+    Attributes
+    ----------
+    cloud : Cloud
+        As it was read.
+    seen : Cloud
+        The same without the coordinates of the points that ``--where`` leaves out: what the edges were looked for in.
+    edges : Edges
+        Their rows are those of either.
+    """
+
+    cloud: edgel.Cloud
+    seen: edgel.Cloud
+    edges: Edges
+
+    @property
+    def not_selected(self) -> int:
+        """How many finite points ``--where`` left out."""
+        finite = [int(np.isfinite(cloud.xyz).all(axis=1).sum()) for cloud in (self.cloud, self.seen)]
+        return finite[0] - finite[1]
+
+
 def find_edges(
-    source: str, intrinsics: str | None, method: str, given: Mapping[str, Any], stages: Stages
-) -> tuple[edgel.Cloud, Edges]:
+    source: str,
+    reading: files.Reading,
+    where: Where | None,
+    method: str,
+    given: Mapping[str, Any],
+    stages: Stages,
+) -> Found:
     """Read a cloud and find its edges, with the options that `check_options` let through."""
     with stages("reading"):
-        cloud = files.read_cloud(source, intrinsics)
+        cloud = files.read_cloud(source, reading)
+        seen = select(cloud, where)
     with failing_as(ExitCode.DATA, source, arguments(method)):
-        edges = detector(method)(cloud, **given, progress=stages.progress)
+        edges = detector(method)(seen, **given, progress=stages.progress)
     stages.seconds.update(edges.seconds)
-    return cloud, edges
+    return Found(cloud, seen, edges)

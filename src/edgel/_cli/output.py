@@ -84,12 +84,21 @@ def print_table(title: str, rows: Iterable[tuple[str, ...]], *, console: Console
     console.print(table)
 
 
+SCHEMA_VERSION = 1
+"""Of what ``--json`` prints (docs/command-line.md): one more when a field goes or changes meaning."""
+
+
+def schema(name: str) -> dict[str, Any]:
+    """Return the first fields of what ``--json`` prints: which schema it follows."""
+    return {"schema": f"edgel.{name}", "schema_version": SCHEMA_VERSION}
+
+
 def print_json(values: Mapping[str, Any]) -> None:
-    """Print one JSON object on stdout; NaN and infinities, which JSON has no word for, become null.
+    """Print one JSON object on stdout, on one line; NaN and infinities, which JSON has no word for, become null.
 
     Strings stay exactly what they are, control characters and all beyond ASCII escaped.
     """
-    text = json.dumps(_plain(values), indent=2, allow_nan=False)
+    text = json.dumps(_plain(values), allow_nan=False)
     with _to_stdout():
         sys.stdout.write(text + "\n")
         sys.stdout.flush()
@@ -128,6 +137,18 @@ def seconds(duration: float) -> str:
     if duration < 1:
         return f"{duration:.3f} s"
     return f"{duration:.2f} s" if duration < 10 else f"{duration:.1f} s"
+
+
+def time_rows(by_stage: Mapping[str, float]) -> list[tuple[str, ...]]:
+    """Return the rows of a table that say how long each stage took.
+
+    Examples
+    --------
+    >>> time_rows({"reading": 0.5, "writing": 2})
+    [('time', '2.50 s'), ('  reading', '0.500 s'), ('  writing', '2.00 s')]
+    """
+    rows = {"time": sum(by_stage.values()), **{f"  {name}": duration for name, duration in by_stage.items()}}
+    return [(name, seconds(duration)) for name, duration in rows.items()]
 
 
 def length(value: float) -> str:

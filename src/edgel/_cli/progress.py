@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import TracebackType
 
 from numba.core import event
@@ -10,14 +12,20 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from edgel._cli.output import print_line, seconds, stderr_console
 from edgel._kernels.cache import KernelCache
+from edgel.io.errors import printable
 
 COMPILING = "compiling kernels, first run only"
 
 
 class Watch(event.Listener):
-    """Show the stage that runs, on stderr, and only on a terminal; say anywhere that kernels are being compiled.
+    """Show what runs on one line of stderr, and only on a terminal; say anywhere that kernels are being compiled.
 
     Call it with the name of each stage as it begins: it is the ``progress`` of the library's functions.
+
+    Parameters
+    ----------
+    quiet : bool
+        Whether to say nothing.
 
     Examples
     --------
@@ -25,12 +33,13 @@ class Watch(event.Listener):
     ...     watch("reading")
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, quiet: bool = False) -> None:
         console = stderr_console()
         columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
-        self._bar = Progress(*columns, console=console, transient=True) if console.is_terminal else None
+        self._bar = Progress(*columns, console=console, transient=True) if console.is_terminal and not quiet else None
         self._task = None if self._bar is None else self._bar.add_task("starting", total=None)
-        self._stage = "starting"
+        self._quiet = quiet
+        self._count, self._name, self._stage = "", "", "starting"
         self._depth = 0  # a kernel that calls another compiles it meanwhile
         self._told = False
         self._began = 0.0
@@ -40,6 +49,19 @@ class Watch(event.Listener):
         """Show the name of a stage."""
         self._stage = stage
         self._describe(stage)
+
+    def begin(self, count: str, name: str = "") -> None:
+        """Show which of several things the stages are of, from now on; where the line is too short its name is cut."""
+        self._count, self._name = f"{count}: ", name and f", {name}"
+
+    @contextmanager
+    def aside(self) -> Iterator[None]:
+        """Clear the line while something else is printed."""
+        if self._bar is not None:
+            self._bar.stop()
+        yield
+        if self._bar is not None:
+            self._bar.start()
 
     def __enter__(self) -> Watch:
         """Begin to watch."""
@@ -56,7 +78,7 @@ class Watch(event.Listener):
         event.unregister("numba:compile", self)
         if self._bar is not None:
             self._bar.stop()
-        if error is None and self._told and self.compile_seconds > 1:
+        if error is None and self._told and not self._quiet and self.compile_seconds > 1:
             later = (
                 "start at once" if KernelCache.keeps else "will too: set NUMBA_CACHE_DIR to a folder to keep them in"
             )
@@ -68,7 +90,7 @@ class Watch(event.Listener):
         if self._depth > 1:
             return
         self._began = time.perf_counter()
-        if self._bar is None and not self._told:
+        if self._bar is None and not self._told and not self._quiet:
             print_line(f"{COMPILING} ...")
         self._told = True
         kernel = event.data["dispatcher"].py_func.__name__.strip("_").replace("_", " ")  # pyright: ignore[reportOptionalSubscript]
@@ -83,4 +105,4 @@ class Watch(event.Listener):
 
     def _describe(self, text: str) -> None:
         if self._bar is not None and self._task is not None:
-            self._bar.update(self._task, description=text)
+            self._bar.update(self._task, description=printable(self._count + text + self._name))

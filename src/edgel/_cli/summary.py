@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
-from edgel._cli.output import count, seconds
+from edgel._cli.output import count, time_rows
 from edgel.edges import EdgeKind, Edges
 
 ORIENTATIONS = {
@@ -38,50 +36,50 @@ def crease_remark(edges: Edges) -> str:
     return ", ".join(words + [f"{count(known[name])} {name}" for name in ("convex", "concave") if known[name]])
 
 
-def collect(
-    source: str,
-    output: str | None,
-    page: Path | None,
-    edges: Edges,
-    by_stage: dict[str, float],
-    renamed: Mapping[str, str],
-) -> dict[str, Any]:
-    """Return what ``--json`` prints."""
+def collect(edges: Edges, not_selected: int, by_stage: dict[str, float]) -> dict[str, Any]:
+    """Return what ``--json`` prints of the edges."""
     return {
-        "input": source,
-        "output": output,
-        "report": None if page is None else str(page),
-        "renamed": dict(renamed),
         "orientation": edges.orientation,
         "method": edges.method,
         "reason": edges.reason,
         "points": edges.num_points,
-        "not_finite": edges.num_dropped,
+        "not_selected": not_selected,
+        "not_finite": edges.num_dropped - not_selected,
         "edge_points": len(edges),
         "share": edges.share,
         "kinds": edges.count_kinds(),
         "creases": creases(edges),
         "normals_undefined": edges.num_without_normal,
-        "parameters": edges.parameters,
+        "parameters": dict(edges.parameters),
         "seconds": by_stage,
         "peak_memory_bytes": peak_memory(),
     }
 
 
-def summary(edges: Edges, by_stage: dict[str, float]) -> list[tuple[str, ...]]:
+def headline(edges: Edges) -> str:
+    """Say how many edge points there are, in some words."""
+    num = edges.num_points - edges.num_dropped
+    return f"{count(len(edges))} edge points of {count(num)}, {edges.share:.1%}"
+
+
+def summary(edges: Edges, not_selected: int, unit: str | None, by_stage: dict[str, float]) -> list[tuple[str, ...]]:
     """Return the rows of the table."""
     rows: list[tuple[str, ...]] = [("points", count(edges.num_points))]
-    if edges.num_dropped:
-        rows.append(("not finite", count(edges.num_dropped), "left out"))
-    rows.append(("edge points", count(len(edges)), f"{edges.share:.1%} of the finite points"))
+    if not_selected:
+        rows.append(("left out", count(not_selected), "by --where"))
+    if edges.num_dropped > not_selected:
+        rows.append(("not finite", count(edges.num_dropped - not_selected), "left out"))
+    those = "points looked at" if not_selected else "finite points"
+    rows.append(("edge points", count(len(edges)), f"{edges.share:.1%} of the {those}"))
     for name, number in edges.count_kinds().items():
         rows.append((f"  {name}", count(number), crease_remark(edges) if name == "crease" else ""))
     if edges.num_without_normal:
         rows.append(("normals undefined", count(edges.num_without_normal), "the neighbours span no plane"))
     rows.append(("method", edges.method, edges.reason))
     rows.append(("orientation", edges.orientation, ORIENTATIONS[edges.orientation]))
-    rows.append(("time", seconds(sum(by_stage.values()))))
-    rows += [(f"  {name}", seconds(duration)) for name, duration in by_stage.items()]
+    if unit is not None:
+        rows.append(("unit", "", f"{unit}, says the file"))
+    rows += time_rows(by_stage)
     if (peak := peak_memory()) is not None:
         rows.append(("memory", f"{peak / 1e6:,.0f} MB", "at most, that of the program itself included"))
     return rows

@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from edgel._cli import options
+from edgel._cli import files, options
 from edgel._cli.errors import ExitCode, Failure, exit_codes
+from edgel._cli.jobs import expand
 from edgel._cli.output import print_line
 
 HELP = """Look at clouds and their edges in the browser, and try what decides about them.
@@ -29,22 +30,36 @@ _LOCAL = ("127.0.0.1", "localhost", "::1")
 
 
 def view(
-    sources: Annotated[list[str], typer.Argument(metavar="FILE...", help="The clouds to show, side by side.")],
+    sources: Annotated[
+        list[str], typer.Argument(metavar="IN", help="The clouds to show, side by side, and folders of them.")
+    ],
     intrinsics: options.Intrinsics = None,
+    columns: options.Columns = None,
+    sample_mesh: options.SampleMesh = None,
     host: Annotated[
         str,
-        typer.Option(metavar="ADDRESS", help="Address to listen at; any other than this one opens the page to others."),
+        options.own(
+            "--host",
+            text="Address to listen at; any other than this one opens the page to others.",
+            group="Page",
+            metavar="ADDRESS",
+            default=_LOCAL[0],
+        ),
     ] = _LOCAL[0],
     port: Annotated[
         int | None,
-        typer.Option(
-            min=1,
-            max=65535,
-            help="Port to listen at. [dim]\\[default: the first free one from 8080][/dim]",
-            show_default=False,
+        options.own(
+            "--port",
+            text="Port to listen at, 1 to 65535.",
+            group="Page",
+            metavar="PORT",
+            default="the first free one from 8080",
         ),
     ] = None,
-    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
+    browser: Annotated[
+        bool,
+        options.own("--browser/--no-browser", text="Open the page in the browser.", group="Page", default="browser"),
+    ] = True,
     debug: options.Debug = False,
 ) -> None:
     """Look at clouds and their edges in the browser."""
@@ -54,13 +69,17 @@ def view(
         except ImportError as error:
             remedy = "install it with: pip install edgel[view]"
             raise Failure(ExitCode.USAGE, f"the viewer needs viser, which is not there ({error}); {remedy}") from error
+        if port is not None and not 0 < port < 65536:
+            raise Failure(ExitCode.USAGE, f"--port: expected 1 to 65535, got {port}")
+        reading = files.Reading(intrinsics, columns, sample_mesh)
+        clouds = expand(sources, reading)
         if host not in _LOCAL:
             print_line(
                 f"--host {host}: whoever learns the page's address can see the clouds and press every button",
                 style="yellow",
             )
         try:
-            serve(sources, host=host, port=port, intrinsics=intrinsics, open_browser=browser, ready=_tell)
+            serve(clouds, host=host, port=port, reading=reading.given, open_browser=browser, ready=_tell)
         except OSError as error:
             where = f"{host}:{port}" if port else host
             remedy = "choose another --port, or leave it out" if port else "choose another --host, or leave it out"

@@ -19,8 +19,8 @@ _NO_KIND = "# no kind of edge is chosen"
 def command_line(pane: Pane, settings: Settings) -> str:
     """Write the ``edgel detect`` that finds exactly the edges of a pane."""
     words = ["edgel", "detect", pane.source.path]
-    if pane.source.intrinsics is not None:
-        words += ["--intrinsics", str(pane.source.intrinsics)]
+    for name, value in pane.source.reading.items():
+        words += ["--" + name.replace("_", "-"), str(value)]
     if settings.scale > 1:
         words += ["--scale", f"{settings.scale:g}"]
     if pane.method == "paper":
@@ -52,8 +52,8 @@ def python_lines(pane: Pane, settings: Settings) -> str:
         if settings.angle > 0:
             imports = ["import math", "", *imports]
             blunt = [f"edges = edges.drop_blunt(math.radians({math.degrees(settings.angle):g}))"]
-    camera = "" if pane.source.intrinsics is None else f", intrinsics={str(pane.source.intrinsics)!r}"
-    lines = [*imports, "", f"cloud = edgel.read({pane.source.path!r}{camera})", f"edges = {found}", *blunt]
+    reading = "".join(f", {name}={value!r}" for name, value in pane.source.reading.items())
+    lines = [*imports, "", f"cloud = edgel.read({pane.source.path!r}{reading})", f"edges = {found}", *blunt]
     if settings.is_cropped:
         corners = [", ".join(map(_number, corner)) for corner in pane.box.tolist()]
         lines.append(f"edges = edges.crop(cloud, [[{corners[0]}], [{corners[1]}]])")

@@ -8,9 +8,10 @@ import socket
 import sys
 import threading
 import webbrowser
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
+from typing import Any
 
 import viser
 
@@ -27,7 +28,7 @@ def serve(
     *,
     host: str = LOCAL[0],
     port: int | None = None,
-    intrinsics: str | None = None,
+    reading: Mapping[str, Any] | None = None,
     open_browser: bool = True,
     ready: Callable[[str], None] = lambda url: None,
 ) -> None:
@@ -40,8 +41,8 @@ def serve(
         Address to listen at.
     port : int, optional
         Default: the first free one from 8080.
-    intrinsics : str, optional
-        The camera of depth images.
+    reading : mapping, optional
+        Options of `edgel.read`.
     open_browser : bool
     ready : callable
         Called with the page's address once it can be reached.
@@ -51,7 +52,7 @@ def serve(
     OSError
         If nothing can listen at that address.
     """
-    with running(paths, host=host, port=port, intrinsics=intrinsics) as viewer:
+    with running(paths, host=host, port=port, reading=reading) as viewer:
         ready(viewer.url)
         if open_browser and _has_screen():
             webbrowser.open(viewer.url)
@@ -70,10 +71,14 @@ class Viewer:
 
 @contextmanager
 def running(
-    paths: Sequence[str], *, host: str = LOCAL[0], port: int | None = None, intrinsics: str | None = None
+    paths: Sequence[str],
+    *,
+    host: str = LOCAL[0],
+    port: int | None = None,
+    reading: Mapping[str, Any] | None = None,
 ) -> Iterator[Viewer]:
     """Serve the page for as long as the ``with`` lasts; as `serve`, which waits for Ctrl-C."""
-    session = Session(paths, intrinsics=intrinsics)
+    session = Session(paths, reading=reading)
     guard = Guard(host)
     server = _listen(host, _free_port(host, port), guard)
     page = Page(server, session)

@@ -6,7 +6,7 @@ import os
 import sys
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -71,8 +71,8 @@ class Session:
     Parameters
     ----------
     paths : sequence of paths
-    intrinsics : path, optional
-        The camera of depth images.
+    reading : mapping, optional
+        Options of `edgel.read`.
     detect : callable
         Runs a detector, as `find_edges` does.
     read : callable
@@ -83,11 +83,11 @@ class Session:
         self,
         paths: Sequence[str | os.PathLike[str]],
         *,
-        intrinsics: str | os.PathLike[str] | None = None,
+        reading: Mapping[str, Any] | None = None,
         detect: Callable[[Cloud, Run, Callable[[str], None]], Edges] = find_edges,
         read: Callable[..., Cloud] = edgel.read,
     ) -> None:
-        self.sources = [Source(path, intrinsics=intrinsics, read=read) for path in paths]
+        self.sources = [Source(path, reading=reading, read=read) for path in paths]
         for source in self.sources:
             if [other.name for other in self.sources].count(source.name) > 1:
                 source.name = printable(source.path)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -52,8 +52,8 @@ class Source:
     Parameters
     ----------
     path : path
-    intrinsics : path, optional
-        The camera of a depth image.
+    reading : mapping, optional
+        Options of `edgel.read`.
     read : callable
         Reads a cloud, as `edgel.read` does.
 
@@ -80,10 +80,10 @@ class Source:
         self,
         path: str | os.PathLike[str],
         *,
-        intrinsics: str | os.PathLike[str] | None = None,
+        reading: Mapping[str, Any] | None = None,
         read: Callable[..., Cloud] = edgel.read,
     ) -> None:
-        self.path, self.name, self.intrinsics = os.fspath(path), printable(Path(path).name), intrinsics
+        self.path, self.name, self.reading = os.fspath(path), printable(Path(path).name), dict(reading or {})
         self._read = read
         self.cloud: Cloud | None = None
         self.error = ""
@@ -125,7 +125,7 @@ class Source:
     def load(self) -> None:
         """Read the file; what is wrong with it becomes `error`, whatever it is."""
         try:
-            cloud = self._read(self.path, intrinsics=self.intrinsics)
+            cloud = self._read(self.path, **self.reading)
             rows = check_points(cloud).rows
             if len(rows) > MAX_SHOWN:
                 chosen = np.random.default_rng(0).choice(len(rows), MAX_SHOWN, replace=False, shuffle=False)

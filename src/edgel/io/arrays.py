@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import warnings
 from typing import IO
 
@@ -42,4 +43,15 @@ def read_array(path: str, file: IO[bytes], size: int) -> np.ndarray:
         found = len(raw) // dtype.itemsize
         raise FormatError(f"{path}: declared {count} values, found {found}; the file is cut off: get it again")
     array = np.frombuffer(bytearray(raw), dtype, count) if raw else np.empty(count, dtype)
+    _check_texts(path, array)
     return array.reshape(shape, order="F" if fortran else "C")
+
+
+def _check_texts(path: str, array: np.ndarray) -> None:
+    """Refuse characters beyond Unicode, over which Python fails wherever it meets them."""
+    for name in array.dtype.names or ():
+        _check_texts(path, array[name])
+    if array.dtype.kind == "U" and array.dtype.itemsize:
+        codes = np.ascontiguousarray(array).view(array.dtype.byteorder.replace("|", "=") + "u4")
+        if codes.size and int(codes.max()) > sys.maxunicode:
+            raise FormatError(f"{path}: holds texts of characters that do not exist; get the file again")

@@ -75,7 +75,7 @@ def read(path: str | os.PathLike[str]) -> Cloud:
     with reading(path) as file:
         check_xml(name, file, size)
     try:
-        scans, num_images = _read_scans(name, lib, size)
+        scans, num_images, extensions = _read_scans(name, lib, size)
     except (FormatError, MemoryError):
         raise
     except Exception as error:  # libe57 has its own base of errors, and its bindings raise others
@@ -84,17 +84,20 @@ def read(path: str | os.PathLike[str]) -> Cloud:
             f"{name}: the E57 file is damaged ({reason[0] if reason else 'unknown'}); get it again"
         ) from None
     cloud = _merge(scans)
+    if extensions:
+        cloud = replace(cloud, metadata={**cloud.metadata, "e57_extensions": extensions})
     if num_images:
         cloud = replace(cloud, metadata={**cloud.metadata, "left_out": (f"{num_images} images",)})
     return cloud
 
 
-def _read_scans(path: str, lib: ModuleType, size: int) -> tuple[list[_Scan], int]:
+def _read_scans(path: str, lib: ModuleType, size: int) -> tuple[list[_Scan], int, dict[str, str]]:
+    """Return the scans, the number of images, and the addresses of the extensions by prefix."""
     image = lib.ImageFile(path, "r")
     try:
         root = image.root()
         if not root.isDefined("data3D"):
-            return [], 0
+            return [], 0, {}
         data = root["data3D"]
         layouts = [_layout(lib, data[i]["points"]) for i in range(len(data))]
         # All scans together: they may point to the same bytes.
@@ -108,7 +111,9 @@ def _read_scans(path: str, lib: ModuleType, size: int) -> tuple[list[_Scan], int
         bytes_each = (24 + sum(dtype.itemsize for dtype, _ in types.values()) for _, types in layouts)
         check_unpacked(path, sum(c * b for (c, _), b in zip(layouts, bytes_each, strict=True)), size)
         num_images = len(root["images2D"]) if root.isDefined("images2D") else 0
-        return [_read_scan(path, lib, image, data[i], *layouts[i]) for i in range(len(data))], num_images
+        extensions = {image.extensionsPrefix(i): image.extensionsUri(i) for i in range(image.extensionsCount())}
+        extensions = {prefix: address for prefix, address in extensions.items() if prefix not in ("", PREFIX)}
+        return [_read_scan(path, lib, image, data[i], *layouts[i]) for i in range(len(data))], num_images, extensions
     finally:
         image.close()
 

@@ -35,6 +35,7 @@ _MAGIC: list[tuple[bytes, str, str]] = [
     (rb"glTF", "a glTF model", "it is a mesh, not a point cloud; sample it first"),
     (rb"solid\s", "an STL mesh", "it is a mesh, not a point cloud; sample it first"),
     (rb"\x89MCAP|#ROSBAG", "a ROS recording", "convert its point clouds to PCD first"),
+    (rb"CCB[\d2]", "a CloudCompare project", "save its clouds as PLY or E57"),
     (rb"\x1f\x8b", "gzip-compressed", "unpack it first (gunzip)"),
     (rb"BZh|\xfd7zXZ|\x28\xb5\x2f\xfd|7z\xbc\xaf", "a compressed archive", "unpack it first"),
     (rb"\x89HDF", "an HDF5 file", "convert it to .npz first"),
@@ -98,10 +99,17 @@ def check_readable(path: str | os.PathLike[str]) -> None:
         status = os.stat(path)
     except FileNotFoundError:
         raise FileNotFoundError(f"{printable(path)}: no such file; check the name and the folder") from None
+    except ValueError as error:
+        raise _no_name(path, error) from None
     if stat.S_ISDIR(status.st_mode):
         raise IsADirectoryError(f"{printable(path)}: is a folder; pass one file of it")
     if stat.S_ISREG(status.st_mode) and status.st_size == 0:
         raise FormatError(f"{os.fspath(path)}: the file is empty; write it again")
+
+
+def _no_name(path: object, error: ValueError) -> FormatError:
+    """Return the error of a name with a NUL in it, or with characters that do not exist."""
+    return FormatError(f"{path}: is no name that a file can have ({error}); name another file")
 
 
 @contextmanager
@@ -159,6 +167,8 @@ def check_replaceable(path: str | os.PathLike[str]) -> os.stat_result | None:
         status = os.stat(path)
     except (FileNotFoundError, NotADirectoryError):
         return None
+    except ValueError as error:
+        raise _no_name(path, error) from None
     if stat.S_ISDIR(status.st_mode):
         raise IsADirectoryError(f"{printable(path)}: is a folder; name the file to write")
     if stat.S_ISBLK(status.st_mode):

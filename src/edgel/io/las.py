@@ -4,48 +4,26 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any, BinaryIO
 
 import laspy
 import numpy as np
 
 from edgel.cloud import Cloud
-from edgel.io.columns import flat_attributes
 from edgel.io.errors import FormatError
-from edgel.io.files import reading, replacing, wrong_magic
+from edgel.io.files import reading, wrong_magic
 from edgel.io.las_crs import crs_of
-from edgel.io.las_header import choose_grid, fit_dimensions, header_for
+from edgel.io.las_header import foreign_errors, waveforms_of
+from edgel.io.las_write import write
 from edgel.io.laz import CheckedLaz
+
+__all__ = ["read", "write"]
 
 # laspy logs an error before it raises it, which Python prints when nobody listens; the exception says the same.
 logging.getLogger("laspy").addHandler(logging.NullHandler())
 
 # Points decoded at a time: a header that promises too many costs no more than this.
 _CHUNK = 1_000_000
-
-
-@contextmanager
-def _foreign_errors(path: object, doing: str) -> Iterator[None]:
-    """Turn whatever laspy and lazrs raise over a damaged file into a FormatError."""
-    try:
-        yield
-    except FormatError:
-        raise
-    except (MemoryError, KeyboardInterrupt, SystemExit, GeneratorExit):
-        raise
-    except BaseException as error:
-        # A panic of lazrs (Rust) is a BaseException, which `except Exception` lets through; others of its kind pass.
-        panic = type(error).__name__ == "PanicException"
-        if not isinstance(error, Exception) and not panic:
-            raise
-        what = (
-            "its compression is of an old or unknown kind, or damaged" if panic else str(error) or type(error).__name__
-        )
-        raise FormatError(
-            f"{path}: {doing} failed ({what}); get the file again or convert it with `las2las` or PDAL"
-        ) from None
 
 
 def read(path: str | os.PathLike[str]) -> Cloud:
@@ -59,8 +37,8 @@ def read(path: str | os.PathLike[str]) -> Cloud:
     -------
     Cloud
         Every dimension but X, Y, Z as an attribute by laspy's name, bit fields and extra dimensions too. The CRS is WKT
-        or ``EPSG:n`` if the file has one; ``metadata["las_header"]`` is laspy's header, with scales and offsets, for
-        `write`.
+        or ``EPSG:n`` if the file has one; ``metadata["las_header"]`` is laspy's header, with scales, offsets and all
+        records (VLR and EVLR), for `write`. Waveforms that are no EVLR are named in ``metadata["left_out"]``.
 
     Raises
     ------
@@ -84,7 +62,7 @@ def read(path: str | os.PathLike[str]) -> Cloud:
         _check_records(name, file, head, size)
         file.seek(0)
         backend: Any = CheckedLaz(name, size)  # laspy asks for its own type, and needs two methods of it
-        with _foreign_errors(name, "reading LAS"), laspy.open(file, closefd=False, laz_backend=backend) as reader:
+        with foreign_errors(name, "reading LAS"), laspy.open(file, closefd=False, laz_backend=backend) as reader:
             header = reader.header
             _check_size(name, header, size)
             columns = _read_columns(name, reader)
@@ -100,8 +78,8 @@ def read(path: str | os.PathLike[str]) -> Cloud:
                 f"{name}: scales {scales} make coordinates infinite; the header is damaged: get the file again"
             )
     metadata: dict[str, object] = {"las_header": header}
-    if header.number_of_evlrs:
-        metadata["left_out"] = (f"{header.number_of_evlrs} extended records (EVLR)",)
+    if left_out := waveforms_of(header):
+        metadata["left_out"] = (left_out,)
     return Cloud(xyz, columns, crs=crs_of(header), metadata=metadata)
 
 
@@ -147,56 +125,3 @@ def _read_columns(path: str, reader: laspy.LasReader) -> dict[str, np.ndarray]:
         empty = laspy.ScaleAwarePointRecord.zeros(0, header=reader.header)
         return {name: np.array(empty[name]) for name in names}
     return {name: arrays[0] if len(arrays) == 1 else np.concatenate(arrays) for name, arrays in parts.items()}
-
-
-def write(path: str | os.PathLike[str], cloud: Cloud) -> None:
-    """Write a LAS file, or a LAZ file when the name ends in ``.laz``.
-
-    A cloud read from LAS keeps its header: version, point format, CRS, and scales and offsets as long as all points
-    still lie on their grid. Otherwise the scale is the smallest power of ten for which the extent fits 32-bit integers
-    (0.001 mm for a kilometre in metres), and the offset the largest round number below the smallest coordinate.
-    Attributes that LAS does not know become extra dimensions; so does, as ``<name>_exact``, one whose values the
-    dimension of its name cannot hold (an intensity of 0..1). Organized shape and viewpoint are not kept, LAS has no
-    place for them. COPC is written as plain LAZ.
-
-    Parameters
-    ----------
-    path : path
-    cloud : Cloud
-
-    Raises
-    ------
-    FormatError
-        If a coordinate is NaN or infinite, or an attribute cannot be stored.
-    OSError
-        If the file cannot be written.
-
-    Examples
-    --------
-    >>> import tempfile, numpy as np
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write(f"{folder}/a.las", Cloud(np.eye(3), {"label": np.arange(3)}))
-    ...     read(f"{folder}/a.las").attributes["label"]
-    array([0, 1, 2])
-    """
-    name = os.fspath(path)
-    num_bad = int((~np.isfinite(cloud.xyz).all(axis=1)).sum())
-    if num_bad:
-        raise FormatError(
-            f"{name}: {num_bad} of {len(cloud)} points are NaN or infinite, which LAS cannot store; drop them "
-            "(cloud.take(np.isfinite(cloud.xyz).all(axis=1))) or write .ply, .pcd or .npz"
-        )
-    attributes = flat_attributes(cloud, name, keep_arrays=True)
-    header = header_for(cloud, attributes)
-    values = fit_dimensions(name, header, attributes)
-    scales, offsets = choose_grid(cloud.xyz, header, new="las_header" not in cloud.metadata)
-    header.scales, header.offsets = scales, offsets
-    with _foreign_errors(name, "encoding LAS"):
-        record = laspy.ScaleAwarePointRecord.zeros(len(cloud), header=header)
-        for i, axis in enumerate("XYZ"):
-            record[axis] = np.rint((cloud.xyz[:, i] - offsets[i]) / scales[i]).astype(np.int32)
-        for dimension, column in values.items():
-            record[dimension] = column
-    with replacing(path) as file:
-        data = laspy.LasData(header, record)
-        data.write(file, do_compress=name.lower().endswith(".laz"))

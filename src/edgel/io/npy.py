@@ -8,11 +8,11 @@ from typing import IO
 
 import numpy as np
 
-from edgel.cloud import Cloud
+from edgel.cloud import Cloud, as_cloud
 from edgel.io import depth
 from edgel.io.arrays import read_array
-from edgel.io.columns import find_xyz
-from edgel.io.errors import FormatError
+from edgel.io.columns import free_name
+from edgel.io.errors import FormatError, tell
 from edgel.io.files import reading, replacing, wrong_magic
 from edgel.io.limits import check_unpacked
 
@@ -21,6 +21,8 @@ _MAX_COLUMNS = 16
 # Deflate packs at most 1032 bytes into one.
 _MAX_ZIP_RATIO = 1032
 _KEYS = ("xyz", "points")
+# Keys of our own, and names of arguments of `numpy.savez`.
+_RESERVED = (*_KEYS, "shape", "viewpoint", "crs", "file", "allow_pickle")
 
 
 def read_npy(path: str | os.PathLike[str]) -> Cloud:
@@ -59,17 +61,11 @@ def read_npy(path: str | os.PathLike[str]) -> Cloud:
 
 
 def _cloud_of(path: str, array: np.ndarray) -> Cloud:
-    shape = array.shape[:2] if array.ndim == 3 or (array.ndim == 2 and array.dtype.names) else None
     if array.dtype.names:
-        axes = find_xyz(array.dtype.names)
-        if axes is None or array.ndim not in (1, 2) or any(array.dtype[axis].shape for axis in axes):
-            raise FormatError(
-                f"{path}: records of {', '.join(array.dtype.names)}, shape {array.shape}; x, y and z are needed"
-            )
-        flat = array.reshape(-1)
-        xyz = np.column_stack([_numbers(path, flat[axis]) for axis in axes])
-        rest = {name: np.ascontiguousarray(flat[name]) for name in array.dtype.names if name not in axes}
-        return Cloud(xyz, rest, shape)
+        try:
+            return as_cloud(array)
+        except (TypeError, ValueError) as error:
+            raise FormatError(f"{path}: {str(error).removeprefix('points: ')}") from None
     if array.ndim == 3 and array.shape[2] == 3:
         return Cloud(_numbers(path, array))
     if array.ndim == 2 and 3 <= array.shape[1] <= _MAX_COLUMNS:
@@ -92,10 +88,13 @@ def write_npy(path: str | os.PathLike[str], cloud: Cloud) -> None:
     path : path
     cloud : Cloud
 
+    Warns
+    -----
+    FormatWarning
+        If an attribute is left out because it holds Python objects, or is renamed because it has a coordinate's name.
+
     Raises
     ------
-    FormatError
-        If an attribute holds Python objects or has the name of a coordinate.
     OSError
         If the file cannot be written.
 
@@ -109,12 +108,12 @@ def write_npy(path: str | os.PathLike[str], cloud: Cloud) -> None:
     """
     array = cloud.xyz
     if cloud.attributes:
-        _check_attributes(path, cloud, ("x", "y", "z"))
-        fields = [(name, values.dtype, values.shape[1:]) for name, values in cloud.attributes.items()]
+        attributes = _attributes(path, cloud, ("x", "y", "z"))
+        fields = [(name, values.dtype, values.shape[1:]) for name, values in attributes.items()]
         array = np.empty(len(cloud), np.dtype([("x", "f8"), ("y", "f8"), ("z", "f8"), *fields]))
         for axis, name in enumerate("xyz"):
             array[name] = cloud.xyz[:, axis]
-        for name, values in cloud.attributes.items():
+        for name, values in attributes.items():
             array[name] = values
     if cloud.shape is not None:
         array = array.reshape(*cloud.shape, *array.shape[1:])
@@ -214,10 +213,14 @@ def write_npz(path: str | os.PathLike[str], cloud: Cloud) -> None:
     path : path
     cloud : Cloud
 
+    Warns
+    -----
+    FormatWarning
+        If an attribute is left out because it holds Python objects, or is renamed because its name means something else
+        in the file.
+
     Raises
     ------
-    FormatError
-        If an attribute holds Python objects or has a name that means something else in the file.
     OSError
         If the file cannot be written.
 
@@ -229,7 +232,7 @@ def write_npz(path: str | os.PathLike[str], cloud: Cloud) -> None:
     ...     read_npz(f"{folder}/a.npz").shape
     (2, 3)
     """
-    _check_attributes(path, cloud, ("xyz", "points", "shape", "viewpoint", "crs", "file", "allow_pickle"))
+    attributes = _attributes(path, cloud, _RESERVED)
     extra: dict[str, np.ndarray] = {}
     if cloud.shape is not None:
         extra["shape"] = np.array(cloud.shape)
@@ -238,12 +241,22 @@ def write_npz(path: str | os.PathLike[str], cloud: Cloud) -> None:
     if cloud.crs is not None:
         extra["crs"] = np.array(cloud.crs)
     with replacing(path) as file:
-        np.savez(file, allow_pickle=False, xyz=cloud.xyz, **cloud.attributes, **extra)
+        np.savez(file, allow_pickle=False, xyz=cloud.xyz, **attributes, **extra)
 
 
-def _check_attributes(path: object, cloud: Cloud, taken: tuple[str, ...]) -> None:
+def _attributes(path: object, cloud: Cloud, taken: tuple[str, ...]) -> dict[str, np.ndarray]:
+    """Return what NumPy can store without pickling, under names that mean nothing else; warn of the others."""
+    said: dict[str, str] = {}
+    kept: dict[str, np.ndarray] = {}
     for name, values in cloud.attributes.items():
         if values.dtype.hasobject:
-            raise FormatError(f"{path}: attribute {name!r} holds Python objects; convert it to numbers or leave it out")
-        if name in taken:
-            raise FormatError(f"{path}: attribute {name!r} has a name that means something else here; rename it")
+            said[name] = "left out, it holds Python objects; convert it to numbers"
+            continue
+        word = name.replace("\0", "_") or "_"  # a zip archive cuts names at the NUL
+        word = word.encode("utf-8", "replace").decode()  # nor has it surrogates
+        new = free_name(word, {*kept, *(other for other in cloud.attributes if other != name)}, taken)
+        if new != name:
+            said[name] = f"renamed {new}, the name means something else in the file"
+        kept[new] = values
+    tell(path, said)
+    return kept

@@ -8,17 +8,19 @@ from typing import BinaryIO
 
 import numpy as np
 
+from edgel._objects import NORMALS
 from edgel.cloud import Cloud
-from edgel.io.columns import fits_float32, flat_attributes
 from edgel.io.errors import FormatError
-from edgel.io.files import reading, replacing
+from edgel.io.files import reading
 from edgel.io.limits import check_unpacked
 from edgel.io.lzf import lzf_decompress
+from edgel.io.names import standard_names
 from edgel.io.pcd_header import Header, read_header
-from edgel.io.rows import parse_text, read_binary, reject_row, remaining_bytes, write_binary
+from edgel.io.pcd_write import is_meaningful, write
+from edgel.io.rows import parse_text, read_binary, reject_row, remaining_bytes
 
-_IDENTITY = (1.0, 0.0, 0.0, 0.0)
-_COLORS = ("red", "green", "blue")
+__all__ = ["read", "write"]
+
 # LZF packs at most 264 bytes into three.
 _MAX_LZF_RATIO = 88
 
@@ -35,9 +37,10 @@ def read(path: str | os.PathLike[str]) -> Cloud:
     Cloud
         Fields as attributes of their own type, (N, C) where COUNT is C; padding fields (``_``) left out. Packed ``rgb``
         or ``rgba`` becomes ``red``, ``green``, ``blue`` (uint8), and ``alpha`` from ``rgba`` when it is not 0 or 255
-        throughout. HEIGHT above 1 makes the cloud organized. The translation of VIEWPOINT is the viewpoint (none where
-        it is 0 0 0, PCL's filler, in a cloud that is not organized); all seven numbers are in
-        ``metadata["pcd_viewpoint"]``. Coordinates of an ascii file are parsed as double even where SIZE is 4.
+        throughout; ``normal_x normal_y normal_z`` become ``nx ny nz``. HEIGHT and WIDTH above 1 make the cloud
+        organized. The translation of VIEWPOINT is the viewpoint (none where it is 0 0 0, PCL's filler, in a cloud that
+        is not organized); all seven numbers are in ``metadata["pcd_viewpoint"]``. The shift that `write` takes from
+        large coordinates is added again. Coordinates of an ascii file are parsed as double even where SIZE is 4.
 
     Raises
     ------
@@ -58,16 +61,23 @@ def read(path: str | os.PathLike[str]) -> Cloud:
         body = {"ascii": _read_ascii, "binary": _read_plain, "binary_compressed": _read_compressed}[header.data]
         xyz, fields = body(name, file, header)
     attributes: dict[str, np.ndarray] = {}
+    spelled = {field: name for field, name in standard_names([*fields]).items() if name in NORMALS}
     for field, values in fields.items():
         if field.lower() in ("rgb", "rgba") and values.ndim == 1 and values.dtype.itemsize == 4:
             attributes.update(_unpack_colors(values, with_alpha=field.lower() == "rgba"))
         else:
-            attributes[field] = values
-    shape = (header.height, header.width) if header.height > 1 and header.count else None
+            attributes[spelled.get(field, field)] = values
+    shape = (header.height, header.width) if min(header.height, header.width) > 1 else None
     viewpoint = np.array(header.viewpoint[:3]) if header.viewpoint else None
     if viewpoint is not None and shape is None and not viewpoint.any():
         viewpoint = None  # what every writer puts where no sensor is known; a map in UTM is not seen from 0, 0, 0
-    metadata = {"pcd_viewpoint": header.viewpoint} if header.viewpoint else {}
+    metadata: dict[str, object] = {"pcd_viewpoint": header.viewpoint} if header.viewpoint else {}
+    if header.shift is not None:
+        xyz += header.shift
+        metadata["pcd_shift"] = header.shift
+        if viewpoint is not None and header.viewpoint:
+            viewpoint = viewpoint + header.shift
+            metadata["pcd_viewpoint"] = (*viewpoint.tolist(), *header.viewpoint[3:])
     return Cloud(xyz, attributes, shape, viewpoint, None, metadata)
 
 
@@ -147,99 +157,6 @@ def _unpack_colors(packed: np.ndarray, *, with_alpha: bool) -> dict[str, np.ndar
     bits = np.ascontiguousarray(packed).view(np.uint32)
     shifts = {"red": 16, "green": 8, "blue": 0, "alpha": 24}
     channels = {name: (bits >> shift & 255).astype(np.uint8) for name, shift in shifts.items()}
-    if not with_alpha or not _is_meaningful(channels["alpha"]):
+    if not with_alpha or not is_meaningful(channels["alpha"]):
         del channels["alpha"]
     return channels
-
-
-def write(path: str | os.PathLike[str], cloud: Cloud) -> None:
-    """Write a binary PCD file.
-
-    Coordinates become F 4 when that is exact for all of them, else F 8 (which PCL's own point types do not read).
-    ``red``, ``green``, ``blue`` of uint8 are packed into ``rgb`` (F 4), with ``alpha`` into ``rgba`` (U 4), as PCL
-    reads them. Other attributes keep their type; bool becomes U 1 and float16 F 4; (N, C) attributes get COUNT C. The
-    rotation of ``metadata["pcd_viewpoint"]`` is kept; without a viewpoint the line VIEWPOINT is left out.
-
-    Parameters
-    ----------
-    path : path
-    cloud : Cloud
-
-    Raises
-    ------
-    FormatError
-        If PCD cannot hold an attribute.
-    OSError
-        If the file cannot be written.
-
-    Examples
-    --------
-    >>> import tempfile, numpy as np
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write(f"{folder}/a.pcd", Cloud(np.eye(3)))
-    ...     len(read(f"{folder}/a.pcd"))
-    3
-    """
-    columns: dict[str, np.ndarray] = dict(zip("xyz", cloud.xyz.T, strict=True))
-    columns.update(_pack_colors(flat_attributes(cloud, path, keep_arrays=True)))
-    coordinate = "<f4" if fits_float32(cloud.xyz) else "<f8"
-    layout: list[tuple[str, str, tuple[int, ...]]] = []
-    for name, values in columns.items():
-        code = coordinate if name in ("x", "y", "z") else _code(path, name, values)
-        layout.append((name, code, values.shape[1:] if values.shape[1:] != (1,) else ()))
-    columns = {name: values[:, 0] if values.shape[1:] == (1,) else values for name, values in columns.items()}
-    with replacing(path) as file:
-        file.write(_header_text(cloud, layout).encode())
-        write_binary(file, np.dtype(layout), columns)
-
-
-def _pack_colors(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    if not all(name in columns and columns[name].dtype == np.uint8 and columns[name].ndim == 1 for name in _COLORS):
-        return columns
-    if "rgb" in columns or "rgba" in columns:
-        return columns
-    red, green, blue = (columns.pop(name).astype(np.uint32) for name in _COLORS)
-    bits = red << 16 | green << 8 | blue
-    alpha = columns.get("alpha")
-    # An alpha of 0 or 255 throughout would not be read back from rgba: it stays a field of its own.
-    if alpha is not None and alpha.dtype == np.uint8 and alpha.ndim == 1 and _is_meaningful(alpha):
-        del columns["alpha"]
-        return {**columns, "rgba": bits | alpha.astype(np.uint32) << 24}
-    return {**columns, "rgb": bits.view(np.float32)}
-
-
-def _is_meaningful(alpha: np.ndarray) -> bool:
-    return len(alpha) > 0 and not (alpha[0] in (0, 255) and bool((alpha == alpha[0]).all()))
-
-
-def _code(path: object, name: str, values: np.ndarray) -> str:
-    kind, size = values.dtype.kind, values.dtype.itemsize
-    if kind == "b":
-        return "<u1"
-    if (kind, size) == ("f", 2):
-        return "<f4"
-    if size > 8:
-        raise FormatError(f"{path}: attribute {name!r} is {values.dtype}, wider than PCD knows; convert it to float64")
-    return f"<{kind}{size}"
-
-
-def _header_text(cloud: Cloud, layout: list[tuple[str, str, tuple[int, ...]]]) -> str:
-    height, width = cloud.shape or (1, len(cloud))
-    lines = [
-        "# .PCD v0.7 - Point Cloud Data file format",
-        "VERSION 0.7",
-        "FIELDS " + " ".join(name for name, _, _ in layout),
-        "SIZE " + " ".join(code[2:] for _, code, _ in layout),
-        "TYPE " + " ".join(code[1].upper() for _, code, _ in layout),
-        "COUNT " + " ".join(str(shape[0] if shape else 1) for _, _, shape in layout),
-        f"WIDTH {width}",
-        f"HEIGHT {height}",
-    ]
-    if cloud.viewpoint is not None:
-        rotation = tuple(cloud.metadata.get("pcd_viewpoint", ()))[3:] or _IDENTITY
-        lines.append("VIEWPOINT " + " ".join(map(_number, (*cloud.viewpoint.tolist(), *rotation))))
-    return "\n".join([*lines, f"POINTS {len(cloud)}", "DATA binary", ""])
-
-
-def _number(value: float) -> str:
-    return repr(int(value)) if value == int(value) else repr(float(value))

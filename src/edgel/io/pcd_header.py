@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import BinaryIO
 
 import numpy as np
 
-from edgel.io.columns import find_xyz
+from edgel._objects import find_xyz
 from edgel.io.errors import FormatError
 from edgel.io.files import wrong_magic
 from edgel.io.limits import LONGEST_HEADER, whole_number
 from edgel.io.rows import number_of
 
+SHIFT = "# edgel shift"
+"""How the comment begins that holds what was taken from x, y and z."""
 _TYPES = {"F": ("4", "8"), "I": ("1", "2", "4", "8"), "U": ("1", "2", "4", "8")}
 # Values of one point, all fields together: a histogram has hundreds.
 _MOST_VALUES = 1 << 20
@@ -21,7 +23,10 @@ _MOST_VALUES = 1 << 20
 
 @dataclass(frozen=True)
 class Header:
-    """What a PCD header says; `axes` are the fields of x, y and z, `padding` those to leave out."""
+    """What a PCD header says; `axes` are the fields of x, y and z, `padding` those to leave out.
+
+    `shift` is what `edgel.io.pcd_write` has taken from all coordinates, which it says in a comment.
+    """
 
     dtype: np.dtype
     padding: list[str]
@@ -32,6 +37,7 @@ class Header:
     viewpoint: tuple[float, ...] | None
     data: str
     num_lines: int
+    shift: tuple[float, float, float] | None = None
 
 
 def read_header(path: str, file: BinaryIO) -> Header:
@@ -54,7 +60,17 @@ def read_header(path: str, file: BinaryIO) -> Header:
         wrong_magic(path, "a PCD file (it has no PCD header)", head + file.read(512))
     if "DATA" not in entries:
         raise FormatError(f"{path}: the PCD header breaks off at line {num_lines}, before DATA; get the file again")
-    return _parse_header(path, entries, num_lines)
+    return replace(_parse_header(path, entries, num_lines), shift=_parse_shift(path, head))
+
+
+def _parse_shift(path: str, head: bytes) -> tuple[float, float, float] | None:
+    line = re.search(rb"^" + SHIFT.encode() + rb"\b([^\n:]*)", head, re.MULTILINE)
+    if line is None:
+        return None
+    words = line[1].decode("utf-8", "replace").split()
+    if len(words) != 3 or not all(number_of(word) and np.isfinite(float(word)) for word in words):
+        raise FormatError(f"{path}: {SHIFT} is {' '.join(words)[:60]!r}; three finite numbers are needed")
+    return float(words[0]), float(words[1]), float(words[2])
 
 
 def _parse_header(path: str, entries: dict[str, list[str]], num_lines: int) -> Header:
@@ -65,18 +81,20 @@ def _parse_header(path: str, entries: dict[str, list[str]], num_lines: int) -> H
         found = f"{len(fields)} FIELDS, {len(sizes)} SIZE, {len(types)} TYPE, {len(counts)} COUNT"
         raise FormatError(f"{path}: the PCD header does not fit together ({found}); mend or re-export the file")
     axes = find_xyz(fields)
-    if axes is None:
+    if axes is None or not {*axes} <= {field for field, count in zip(fields, counts, strict=True) if count.strip("0")}:
         raise FormatError(f"{path}: the PCD fields are {' '.join(fields)}; x, y and z are needed")
     layout, padding = [], []
     for i, (field, size, kind, count) in enumerate(zip(fields, sizes, types, counts, strict=True)):
-        number = whole_number(count) or 0
-        if size not in _TYPES.get(kind.upper(), ()) or not 0 < number <= _MOST_VALUES:
+        number = whole_number(count)
+        if size not in _TYPES.get(kind.upper(), ()) or number is None or number > _MOST_VALUES:
             raise FormatError(
                 f"{path}: PCD field {field!r} has TYPE {kind} SIZE {size} COUNT {count}; mend or re-export the file"
             )
+        if number == 0:
+            continue  # padding of nothing, as PCL writes it between fields that need none
         if field == "_":
             padding.append(f"_{i}")
-        shape = () if count == "1" else (number,)
+        shape = () if number == 1 else (number,)
         layout.append((f"_{i}" if field == "_" else field, "<" + kind.lower() + size, shape))
     if sum(int(count) for count in counts) > _MOST_VALUES:
         raise FormatError(f"{path}: PCD COUNT {' '.join(counts)[:60]}: more than {_MOST_VALUES} values a point")

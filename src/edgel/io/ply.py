@@ -5,19 +5,26 @@ from __future__ import annotations
 import os
 from io import BytesIO, TextIOWrapper
 from itertools import islice
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 
+from edgel._objects import COLORS, NORMALS, find_xyz
 from edgel.cloud import Cloud
-from edgel.io.columns import find_xyz, fits_float32, flat_attributes, one_line
-from edgel.io.errors import FormatError
+from edgel.io.columns import fits_float32, flat_attributes, narrowed, one_line
+from edgel.io.errors import FormatError, tell
 from edgel.io.files import reading, replacing
 from edgel.io.limits import LONGEST_LINE, whole_number
+from edgel.io.mesh import OFFER
 from edgel.io.ply_grid import range_grid, read_grid, spread
 from edgel.io.ply_header import NAMES, Element, Header, cut_off, read_header
 from edgel.io.ply_lists import gather, skip, walk
 from edgel.io.rows import number_of, parse_text, read_binary, reject_row, remaining_bytes, write_binary
+
+# CloudCompare's mark of a scalar field; what other programs know by name has none.
+PREFIX = "scalar_"
+_KNOWN = {*COLORS, "alpha", *NORMALS, "intensity"}
+_FACES = ("face", "faces", "tristrips")
 
 
 def read(path: str | os.PathLike[str] | BinaryIO) -> Cloud:
@@ -31,9 +38,10 @@ def read(path: str | os.PathLike[str] | BinaryIO) -> Cloud:
     Returns
     -------
     Cloud
-        All scalar vertex properties as (N,) attributes of their own type; list properties, faces and other elements are
-        left out, and named in ``metadata["left_out"]``. ``obj_info num_cols`` and ``num_rows`` make the cloud
-        organized; where Stanford's ``range_grid`` lists only the valid points, the other cells are NaN.
+        All scalar vertex properties as (N,) attributes of their own type and name, but for the prefix of `write`; list
+        properties, faces and other elements are left out, and named in ``metadata["left_out"]``; with faces
+        ``metadata["notices"]`` says that it is a mesh. ``obj_info num_cols`` and ``num_rows`` make the cloud organized;
+        where Stanford's ``range_grid`` lists only the valid points, the other cells are NaN.
 
     Raises
     ------
@@ -67,7 +75,7 @@ def _read(path: str, file: BinaryIO) -> Cloud:
     _check_size(path, header, vertex, file)
     read_body = _read_ascii if header.ascii else _read_binary
     xyz, attributes = read_body(path, file, header, header.elements[:position], vertex, axes)
-    cloud = _to_cloud(path, header, xyz, attributes)
+    cloud = _to_cloud(path, header, xyz, _without_prefix(header, attributes))
     grid = range_grid(header)
     if cloud.shape is None and grid is not None:
         position, shape = grid
@@ -154,6 +162,14 @@ def _read_with_lists(path: str, file: BinaryIO, header: Header, vertex: Element)
     }
 
 
+def _without_prefix(header: Header, attributes: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Take off the prefix that `write` has put before names; all stay as they are where one would be there twice."""
+    prefix = header.info.get("prefix", "")
+    bare = {name.removeprefix(prefix) or name: values for name, values in attributes.items()}
+    clash = len(bare) < len(attributes) or any(name.lower() in ("x", "y", "z") for name in bare)
+    return attributes if clash else bare
+
+
 def _to_cloud(path: str, header: Header, xyz: np.ndarray, attributes: dict[str, np.ndarray]) -> Cloud:
     shape = header.shape
     if shape is not None and shape[0] * shape[1] != len(xyz):
@@ -164,9 +180,11 @@ def _to_cloud(path: str, header: Header, xyz: np.ndarray, attributes: dict[str, 
         if len(words) != 3 or not all(number_of(word) and np.isfinite(float(word)) for word in words):
             raise FormatError(f"{path}: obj_info viewpoint {' '.join(words)!r}; three finite numbers are needed")
         viewpoint = np.array(words, np.float64)
-    metadata = {"ply_comments": tuple(header.comments)} if header.comments else {}
+    metadata: dict[str, Any] = {"ply_comments": tuple(header.comments)} if header.comments else {}
     if left_out := _left_out(header):
         metadata["left_out"] = left_out
+    if num_faces := sum(e.count for e in header.elements if e.name in _FACES):
+        metadata["notices"] = (f"a mesh of {num_faces:,} faces: its vertices are no scan of it; to {OFFER}",)
     return Cloud(xyz, attributes, shape, viewpoint, header.info.get("crs") or None, metadata)
 
 
@@ -182,20 +200,25 @@ def _left_out(header: Header) -> tuple[str, ...]:
 def write(path: str | os.PathLike[str] | BinaryIO, cloud: Cloud) -> None:
     """Write a binary little-endian PLY file.
 
-    Coordinates become float when that is exact for all of them, else double. Attributes keep their type where PLY has
-    it; bool becomes uchar, float16 float, and 64-bit integers the smallest of int, uint and double that holds them
-    exactly. (N, C) attributes become ``name_0 .. name_{C-1}``. Organized shape (``num_cols``, ``num_rows``, the
-    Stanford convention), viewpoint and CRS go into ``obj_info`` lines.
+    Coordinates become float when that is exact for all of them, else double. Other programs know normals ``nx ny nz``,
+    colors and ``intensity`` by name; attributes of any other name get CloudCompare's prefix ``scalar_``, without which
+    it does not load them; ``obj_info prefix`` says so, and `read` takes it off again. The types are those that Open3D
+    reads: the smallest of uchar, int, float and double that holds every value exactly, no smaller than the attribute's
+    own. (N, C) attributes become ``name_0 .. name_{C-1}``. Organized shape (``num_cols``, ``num_rows``, the Stanford
+    convention), viewpoint and CRS go into ``obj_info`` lines.
 
     Parameters
     ----------
     path : path or binary file
     cloud : Cloud
 
+    Warns
+    -----
+    FormatWarning
+        If an attribute is left out because PLY cannot hold it exactly, or is renamed.
+
     Raises
     ------
-    FormatError
-        If PLY cannot hold an attribute without loss.
     OSError
         If the file cannot be written.
 
@@ -208,11 +231,18 @@ def write(path: str | os.PathLike[str] | BinaryIO, cloud: Cloud) -> None:
     >>> file.getvalue().splitlines()[2]
     b'element vertex 3'
     """
+    said: dict[str, str] = {}
     columns = dict(zip("xyz", cloud.xyz.T, strict=True))
     types = dict.fromkeys("xyz", "f4" if fits_float32(cloud.xyz) else "f8")
-    for name, values in flat_attributes(cloud, path).items():
-        columns[name], types[name] = values, _lossless_type(path, name, values)
-    header = _header_text(cloud, types).encode()
+    for name, values in flat_attributes(cloud, said).items():
+        stored = narrowed(values, _types(name, values))
+        if stored is None:
+            said[name] = f"left out, {values.dtype} fits no type of PLY exactly; .npz holds it"
+            continue
+        word = name if name.lower() in _KNOWN else PREFIX + name
+        columns[word], types[word] = stored, stored.dtype.str[1:]
+    tell(path if isinstance(path, (str, os.PathLike)) else getattr(path, "name", "stream"), said)
+    header = _header_text(cloud, types).encode("utf-8", "replace")
     dtype = np.dtype([(name, "<" + code) for name, code in types.items()])
     if isinstance(path, (str, os.PathLike)):
         with replacing(path) as file:
@@ -221,6 +251,15 @@ def write(path: str | os.PathLike[str] | BinaryIO, cloud: Cloud) -> None:
     else:
         path.write(header)
         write_binary(path, dtype, columns)
+
+
+def _types(name: str, values: np.ndarray) -> list[str]:
+    """Return the types that a column may have, the best first: those that Open3D reads, and bytes for colors."""
+    if values.dtype.kind == "b" or values.dtype == np.uint8:
+        return ["u1"]
+    if values.dtype.kind == "f":
+        return ["f4", "f8"] if values.dtype.itemsize < 8 else ["f8"]
+    return ["u1", "i4", "f8"] if name in COLORS else ["i4", "f8"]
 
 
 def _header_text(cloud: Cloud, types: dict[str, str]) -> str:
@@ -232,29 +271,8 @@ def _header_text(cloud: Cloud, types: dict[str, str]) -> str:
         lines.append("obj_info viewpoint " + " ".join(map(repr, cloud.viewpoint.tolist())))
     if cloud.crs:
         lines.append(f"obj_info crs {one_line(cloud.crs)}")
+    if any(name.startswith(PREFIX) for name in types):
+        lines.append(f"obj_info prefix {PREFIX}")
     lines.append(f"element vertex {len(cloud)}")
     lines += [f"property {NAMES[code]} {name}" for name, code in types.items()]
     return "\n".join([*lines, "end_header", ""])
-
-
-def _lossless_type(path: object, name: str, values: np.ndarray) -> str:
-    """Return the PLY type that holds every value exactly, the values' own type where PLY has it."""
-    code = values.dtype.kind + str(values.dtype.itemsize)
-    if code in NAMES:
-        return code
-    if code in ("b1", "f2"):
-        return {"b1": "u1", "f2": "f4"}[code]
-    for candidate in ("i4", "u4") if code in ("i8", "u8") else ():
-        bounds = np.iinfo(candidate)
-        if not len(values) or (int(values.min()) >= bounds.min and int(values.max()) <= bounds.max):
-            return candidate
-    # Doubles hold integers exactly up to 2^53; long doubles only where they are doubles.
-    if values.dtype.kind in "iu":
-        exact = max(-int(values.min()), int(values.max())) <= 2**53
-    else:
-        exact = np.array_equal(values.astype(np.float64), values, equal_nan=True)
-    if not exact:
-        raise FormatError(
-            f"{path}: attribute {name!r} ({values.dtype}) does not fit a PLY type exactly; write .npz instead"
-        )
-    return "f8"

@@ -11,6 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from edgel._kernels.parallel import kernel
+from edgel.io.errors import printable
+
+_WIDEST = 999
+"""Pixels of the Gaussian at most: beyond is nothing but a mistake, which would take hours."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +62,16 @@ def canny(image: np.ndarray, *, kernel_size: int, sigma: float, low: float, high
     gx, gy = gradient(smoothed)
     magnitude = np.hypot(gx, gy)
     return CannyResult(smoothed, magnitude, hysteresis(non_maximum_suppression(magnitude, gx, gy), low, high))
+
+
+def check_gaussian(kernel_size: int, sigma: float) -> None:
+    """Raise ValueError for a Gaussian that no image is smoothed by."""
+    if not isinstance(kernel_size, int | np.integer) or not 1 <= kernel_size <= _WIDEST or kernel_size % 2 == 0:
+        raise ValueError(
+            f"kernel_size: expected an odd number of pixels from 1 to {_WIDEST}, got {printable(kernel_size, 40)}"
+        )
+    if not 0 < sigma <= _WIDEST:
+        raise ValueError(f"sigma: expected a number of pixels above 0, at most {_WIDEST}, got {printable(sigma, 40)}")
 
 
 def gaussian_kernel(kernel_size: int, sigma: float) -> np.ndarray:
@@ -121,12 +135,9 @@ def hysteresis(thinned: np.ndarray, low: float, high: float) -> np.ndarray:
 
 
 def _gaussian_weights(kernel_size: int, sigma: float) -> np.ndarray:
-    if kernel_size < 1 or kernel_size % 2 == 0:
-        raise ValueError(f"kernel_size: expected an odd number of pixels, got {kernel_size}")
-    if not sigma > 0:
-        raise ValueError(f"sigma: expected a number of pixels above 0, got {sigma}")
-    offsets = np.arange(kernel_size) - kernel_size // 2
-    weights = np.exp(-(offsets**2) / (2 * sigma**2))
+    check_gaussian(kernel_size, sigma)
+    with np.errstate(over="ignore"):  # of a sigma of next to nothing: all weight is in the middle
+        weights = np.exp(-(((np.arange(kernel_size) - kernel_size // 2) / sigma) ** 2) / 2)
     return weights / weights.sum()
 
 

@@ -22,7 +22,8 @@ from edgel._scale import at_scale, check_scale
 from edgel._stages import Stages
 from edgel.cloud import check_points
 from edgel.edges import EdgeKind, Edges
-from edgel.paper.canny import CannyResult, canny
+from edgel.io.errors import printable
+from edgel.paper.canny import CannyResult, canny, check_gaussian
 from edgel.paper.projection import PixelGrid, back_project, grey_image, points_near, project
 
 PIXEL_SPACINGS = 4.0  # default pixel, in point spacings: coarse enough for no holes, which would all be edges
@@ -127,6 +128,7 @@ def detect(
     """
     if not 0 <= gray_min <= 255:
         raise ValueError(f"gray_min: expected a grey level from 0 to 255, got {gray_min}")
+    check_gaussian(kernel_size, sigma)
     checked = check_points(points)
     check_num_neighbors(num_neighbors, len(checked.xyz))
     check_scale(scale)
@@ -210,8 +212,10 @@ def choose_grid(xyz: np.ndarray, width: int | None, height: int | None) -> Pixel
     A frame of one pixel goes round it: no point falls there, so grey is 0, and Canny may find the outline there.
     """
     for name, size in (("width", width), ("height", height)):
-        if size is not None and (not isinstance(size, int | np.integer) or size < 1):
-            raise ValueError(f"{name}: expected a number of pixels above 0, got {size!r}")
+        if size is not None and (not isinstance(size, int | np.integer) or not 1 <= size <= _MAX_PIXELS):
+            raise ValueError(
+                f"{name}: expected a number of pixels from 1 to {_MAX_PIXELS:,}, got {printable(size, 40)}"
+            )
     lower, upper = bounds(xyz)
     extent = upper - lower
     for axis, name in enumerate("xy"):
