@@ -1,11 +1,13 @@
 """How the commands are told what a file holds, and what they tell of it."""
 
+import json
+
 import numpy as np
 import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
-from edgel import io
+from edgel import Cloud, io
 from edgel._cli import app
 
 RUNNER = CliRunner(env={"COLUMNS": "200"})
@@ -74,3 +76,33 @@ def test_the_camera_beside_an_image(tmp_path):
     code, _, said = run("convert", tmp_path / "a.png", tmp_path / "a.pcd")
     assert code == 0
     assert "intrinsics.json: fx 20" in said
+
+
+@pytest.mark.parametrize("command", ["convert", "normals"])
+def test_what_a_format_cannot_hold_is_told_once(tmp_path, command):
+    xyz = np.random.default_rng(0).random((50, 3))
+    for name in "ab":
+        io.write(tmp_path / f"{name}.npz", Cloud(xyz, {"id": np.arange(50), "tree": np.full(50, 2**60)}))
+    to = [] if command == "convert" else ["-o"]
+    code, _, said = run(command, tmp_path / "a.npz", *to, tmp_path / "a.ply")
+    assert code == 0, said
+    assert said.count("tree: left out") == 1
+    assert "fits no type of PLY" in said
+    assert run(command, tmp_path / "a.npz", *to, tmp_path / "a.ply", "--quiet") == (0, "", "")
+    code, shown, said = run(command, tmp_path / "a.npz", *to, tmp_path / "a.ply", "--json")
+    lost = json.loads(shown)["lost"]
+    assert ([line for line in lost if "tree" in line], "left out" in said) == (lost, False)
+    assert len(lost) == 1
+    several = [tmp_path / "a.npz", tmp_path / "b.npz", *to, f"{tmp_path}/out/", "--format", "ply", "--workers", "2"]
+    code, _, said = run(command, *several)
+    assert (code, said.count("tree: left out")) == (0, 2)
+
+
+def test_of_a_folder_only_what_an_option_is_for(tmp_path):
+    (tmp_path / "a.txt").write_text("7 1 2 3\n8 4 5 6\n9 4 5 7\n")
+    io.write(tmp_path / "b.ply", Cloud(np.eye(3)))
+    code, shown, said = run("info", tmp_path, "--columns", "_,x,y,z", "--json")
+    assert (code, [json.loads(line)["input"] for line in shown.splitlines()]) == (0, [str(tmp_path / "a.txt")]), said
+    (tmp_path / "a.txt").unlink()
+    code, _, said = run("info", tmp_path, "--columns", "_,x,y,z")
+    assert (code, "is a folder without clouds for --columns" in said) == (3, True)
