@@ -12,9 +12,9 @@ demo: install
 test: install lint
 	$(BIN)/pytest
 
-# The kernels with every index checked: none reads or writes outside its arrays.
+# The kernels with every index checked, by two processes: none reads or writes outside its arrays.
 checked: install
-	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(CURDIR)/$(VENV)/checked $(BIN)/pytest -q tests/kernels tests/neighbors tests/surface/test_evidence.py tests/range_image tests/color tests/test_golden.py tests/test_from_depth.py tests/fuzz/test_fuzz_detect.py
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(CURDIR)/$(VENV)/checked $(BIN)/pytest -q -n 2 tests/kernels tests/neighbors tests/surface/test_evidence.py tests/range_image tests/color tests/test_golden.py tests/test_from_depth.py tests/fuzz/test_fuzz_detect.py
 
 lint: install
 	$(BIN)/ruff check .

@@ -250,7 +250,7 @@ def test_crop_and_colors(page):
     page.mouse.move(box["x"] - 80, box["y"] + box["height"] / 2, steps=5)
     page.mouse.up()
     wait_for(lambda: shown(page) < before, "fewer edges")
-    assert "--crop" in page.locator(".edgel-code").inner_text()
+    wait_for(lambda: "--crop" in page.locator(".edgel-code").inner_text(), "the crop in the command line")
     page.get_by_role("button", name="Whole cloud").click()
     wait_for(lambda: shown(page) == before, "all edges")
     grey = np.ptp(picture(page), axis=2).mean()
