@@ -10,7 +10,7 @@ import numpy as np
 from edgel._color import color_channels, color_edges
 from edgel._labels import LIKELY, label_edges, strength_of_contrast
 from edgel._neighbors.normals import check_num_neighbors
-from edgel._neighbors.orientation import check_orient, own_normals, who_knows
+from edgel._neighbors.orientation import check_orient, who_knows
 from edgel._range_image import METHODS, choose_view, see_edges, without_no_return
 from edgel._scale import at_scale, check_scale
 from edgel._sides import orient_faces, viewer_of
@@ -123,10 +123,9 @@ def detect(
         else:
             fitted = None if found is None else surface.faces(edge, kind[edge], k, viewer)
             faces = seen.faces(edge, xyz, viewer, fitted)
-    own = own_normals(cloud)
-    own = None if own is None else own[finite.rows]
-    orientation = who_knows(orient, sensor=viewpoint is not None or seen is not None, own=own is not None)
     with stages("orientation"):
+        orientation, own = who_knows(orient, cloud, sensor=viewpoint is not None or seen is not None)
+        own = None if own is None else own[finite.rows]
         faces = orient_faces(faces, orientation, edge, labels.strength[edge] >= LIKELY, surface, own)
     return Edges(
         index=finite.rows[edge],

@@ -8,8 +8,9 @@ import numpy as np
 
 from edgel._faces import Faces
 from edgel._kernels.parallel import kernel
+from edgel._neighbors.kdtree import bounds
 from edgel._neighbors.knn import visit_neighbors
-from edgel._neighbors.normals import OUTWARD, SENSOR, UNKNOWN
+from edgel._neighbors.normals import SENSOR, UNKNOWN
 from edgel._neighbors.orientation import outward_normals
 from edgel._neighbors.queries import at_points
 from edgel._neighbors.spacing import disc_spacing
@@ -24,12 +25,13 @@ TOLD = 0.3  # of the votes, by which one side has to be ahead
 
 def viewer_of(view: View, viewpoint: np.ndarray | None, xyz: np.ndarray) -> np.ndarray | None:
     """Return from where a cloud (N, 3) is seen, (3,): the viewpoint, or its view's; None: from nowhere or above."""
-    if viewpoint is not None or view.image is None or view.image.viewpoint is not None:
-        return viewpoint if view.image is None or viewpoint is not None else view.image.viewpoint
-    if (view.image.direction == (0.0, 0.0, -1.0)).all():
-        return None
-    far = 1e6 * float(np.ptp(xyz, axis=0).max())
-    return (xyz.min(axis=0) + xyz.max(axis=0)) / 2 - far * view.image.direction
+    image = view.image
+    if viewpoint is not None or image is None:
+        return viewpoint
+    if image.viewpoint is not None or (image.direction == (0.0, 0.0, -1.0)).all():
+        return image.viewpoint
+    low, high = bounds(xyz)
+    return (low + high) / 2 - 1e6 * float((high - low).max()) * image.direction
 
 
 def orient_faces(
@@ -51,7 +53,7 @@ def orient_faces(
     if orientation == UNKNOWN:
         return replace(faces, convex=np.zeros_like(faces.convex))
     index, votes, pooled = surface.index, np.zeros(len(edge)), np.zeros(len(edge))
-    normals = outward_normals(index) if own is None or orientation == OUTWARD else own
+    normals = outward_normals(index) if own is None else own
     queries, row = at_points(index, edge), np.full(len(index), -1)
     row[edge[sure]] = np.flatnonzero(sure)
     arguments = (faces.position, faces.normals, normals[index.order], votes)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from edgel._kernels.parallel import kernel
-from edgel._kernels.union_find import find_root
+from edgel._kernels.union_find import keep_linked
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.queries import every_point
@@ -51,7 +51,7 @@ def hysteresis(xyz: np.ndarray, spacing: np.ndarray, strong: np.ndarray) -> np.n
     index = build_index(xyz)
     visit_neighbors(_link, every_point(index), index, min(_NEAREST, len(xyz)), index.order, spacing, links)
     kept = np.zeros(len(xyz), np.bool_)
-    _follow(links, strong, kept)
+    keep_linked(links, strong, kept)
     return kept
 
 
@@ -90,20 +90,3 @@ def _link(first, places, squared, queries, targets, xyz, order, spacing, links):
             if other != row and squared[q, i] <= (_REACH * spacing[row]) ** 2 and filled < links.shape[1]:
                 links[row, filled] = other
                 filled += 1
-
-
-@kernel
-def _follow(links, strong, kept):
-    """Union-find: mark the members of every component that holds a strong point."""
-    parents = np.arange(len(links))
-    for row in range(len(links)):
-        for other in links[row]:
-            if other >= 0:
-                a, b = find_root(parents, row), find_root(parents, other)
-                parents[max(a, b)] = min(a, b)
-    holds = np.zeros(len(links), np.bool_)
-    for row in range(len(links)):
-        if strong[row]:
-            holds[find_root(parents, row)] = True
-    for row in range(len(links)):
-        kept[row] = holds[find_root(parents, row)]

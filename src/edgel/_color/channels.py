@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from edgel._objects import COLORS
 from edgel.cloud import Cloud
 
-_RGB = ("red", "green", "blue")
 _INTENSITY = ("intensity", "scalar_intensity", "reflectance", "reflectivity")
 _PERCENTILES = (1.0, 99.0)  # of the intensity, which has no range of its own: a few glints must not decide
 
@@ -49,9 +49,9 @@ def color_channels(cloud: Cloud) -> np.ndarray | None:
 def rgb_of(cloud: Cloud) -> np.ndarray | None:
     """Return red, green and blue (N, 3) in [0, 1], NaN where not finite; None when the cloud carries none."""
     columns = _columns(cloud)
-    if not all(name in columns for name in _RGB):
+    if not all(name in columns for name in COLORS):
         return None
-    rgb = np.column_stack([columns[name] for name in _RGB]).astype(np.float64)
+    rgb = np.column_stack([columns[name] for name in COLORS]).astype(np.float64)
     rgb[~np.isfinite(rgb).all(axis=1)] = np.nan
     known = rgb[_known(cloud, rgb)]
     return np.clip(rgb / _full_range(columns["red"].dtype, known.max()), 0.0, 1.0) if len(known) else None

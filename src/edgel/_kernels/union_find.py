@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from edgel._kernels.parallel import kernel
 
 
@@ -12,3 +14,20 @@ def find_root(parents, member):
         parents[member] = parents[parents[member]]
         member = parents[member]
     return member
+
+
+@kernel
+def keep_linked(links, strong, kept):
+    """Tell (M,) which of some things links (M, k), -1 for none, join to a strong one (M,), directly or by others."""
+    parents = np.arange(len(links))
+    for row in range(len(links)):
+        for other in links[row]:
+            if other >= 0:
+                a, b = find_root(parents, row), find_root(parents, other)
+                parents[max(a, b)] = min(a, b)
+    holds = np.zeros(len(links), np.bool_)
+    for row in range(len(links)):
+        if strong[row]:
+            holds[find_root(parents, row)] = True
+    for row in range(len(links)):
+        kept[row] = holds[find_root(parents, row)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.normals import OUTWARD, SENSOR, Normals, check_num_neighbors, fit_planes, no_planes, towards
-from edgel._neighbors.orientation import check_orient, outward_normals, own_normals, who_knows
+from edgel._neighbors.orientation import check_orient, outward_normals, who_knows
 from edgel._neighbors.queries import anywhere, every_point
 from edgel.cloud import as_cloud, as_vector, check_points, check_rows
 
@@ -68,31 +68,32 @@ def estimate_normals(
     if viewpoint is None:
         viewpoint = cloud.viewpoint
     viewpoint = None if viewpoint is None else as_vector(viewpoint, "viewpoint")
-    checked, own = check_points(cloud), own_normals(cloud)
+    checked = check_points(cloud)
     index = build_index(checked.xyz)
     k = check_num_neighbors(num_neighbors, len(index))
-    orientation = who_knows(orient, sensor=viewpoint is not None, own=own is not None)
+    orientation, own = who_knows(orient, cloud, sensor=viewpoint is not None)
     if orientation == OUTWARD:
         own = np.full(cloud.xyz.shape, np.nan)
         own[checked.rows] = outward_normals(index)
-    rows = np.arange(len(cloud)) if at is None else check_rows(at, len(cloud))
-    finite = np.asarray(np.isfinite(cloud.xyz[rows]).all(axis=1))
-    xyz = cloud.xyz[rows[finite]]
     if at is None:
+        count, put, rows, xyz = len(cloud), checked.rows, checked.rows, checked.xyz
         planes = fit_planes(index, every_point(index), k)
     else:
+        asked = check_rows(at, len(cloud))
+        put = np.flatnonzero(np.isfinite(cloud.xyz[asked]).all(axis=1))
+        count, rows, xyz = len(asked), asked[put], cloud.xyz[asked[put]]
         planes = fit_planes(index, anywhere(xyz), k) if len(xyz) else no_planes(0)
     if orientation == SENSOR:
         planes = towards(planes, xyz, viewpoint)
     elif own is not None:
-        planes = planes.flipped((planes.normals * own[rows[finite]]).sum(axis=1) < 0)
-    return _put_back(replace(planes, orientation=orientation), finite)
+        planes = planes.flipped((planes.normals * own[rows]).sum(axis=1) < 0)
+    return _put_back(replace(planes, orientation=orientation), put, count)
 
 
-def _put_back(planes: Normals, finite: np.ndarray) -> Normals:
-    """Put planes into the rows of a mask, NaN elsewhere."""
-    if finite.all():
+def _put_back(planes: Normals, rows: np.ndarray, count: int) -> Normals:
+    """Put planes into some rows, ascending, of so many; NaN elsewhere."""
+    if len(rows) == count:
         return planes
-    full = replace(no_planes(len(finite)), orientation=planes.orientation)
-    full.put(np.flatnonzero(finite), planes)
+    full = replace(no_planes(count), orientation=planes.orientation)
+    full.put(rows, planes)
     return full

@@ -53,6 +53,12 @@ class NeighborIndex:
         """Return the coordinates at some places (M,), (M, 3) float64."""
         return np.ascontiguousarray(self.xyz[:, places].T)
 
+    def places_of(self, points: np.ndarray) -> np.ndarray:
+        """Return the places (M,) of some points (M,)."""
+        place = np.empty(len(self), np.int64)
+        place[self.order] = np.arange(len(self))
+        return place[points]
+
     def by_point(self) -> np.ndarray:
         """Return the coordinates of all points, (N, 3) float64."""
         xyz = np.empty((len(self), 3))

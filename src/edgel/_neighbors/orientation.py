@@ -13,6 +13,7 @@ from edgel._neighbors.kdtree import NeighborIndex
 from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.normals import OUTWARD, OWN, SENSOR, UNKNOWN, Normals, fit_planes, no_planes
 from edgel._neighbors.queries import every_place
+from edgel._objects import NORMALS
 from edgel.cloud import Cloud
 
 COUNTS = (8, 16, 32)  # neighbours of the plane at each point
@@ -34,17 +35,23 @@ def check_orient(orient: str, *, has_viewpoint: bool) -> None:
         raise ValueError("orient: 'outward' and a viewpoint contradict each other; give one of them")
 
 
-def who_knows(orient: str, *, sensor: bool, own: bool) -> str:
-    """Say who tells the outside: the whole surface where that is asked for, else a sensor, else the cloud's normals."""
-    return orient if orient == OUTWARD else SENSOR if sensor else OWN if own else UNKNOWN
+def who_knows(orient: str, cloud: Cloud, *, sensor: bool) -> tuple[str, np.ndarray | None]:
+    """Say who tells the outside: the whole surface where that is asked for, else a sensor, else the cloud's normals.
+
+    With the normals (N, 3) where it is they, which may not be units.
+    """
+    if orient == OUTWARD or sensor:
+        return orient if orient == OUTWARD else SENSOR, None
+    own = _own_normals(cloud)
+    return UNKNOWN if own is None else OWN, own
 
 
-def own_normals(cloud: Cloud) -> np.ndarray | None:
-    """Return the normals (N, 3) that came with a cloud as nx, ny, nz, None where it has none; not always units."""
+def _own_normals(cloud: Cloud) -> np.ndarray | None:
+    """Return the normals (N, 3) that came with a cloud as nx, ny, nz, None where it has none."""
     names = {"_".join(name.split()).lower(): name for name in cloud.attributes}
-    if not {"nx", "ny", "nz"} <= set(names):
+    if not {*NORMALS} <= set(names):
         return None
-    columns = [cloud.attributes[names[name]] for name in ("nx", "ny", "nz")]
+    columns = [cloud.attributes[names[name]] for name in NORMALS]
     if any(column.ndim != 1 or column.dtype.kind not in "fiu" for column in columns):
         return None
     normals = np.stack(columns, axis=1).astype(np.float64)

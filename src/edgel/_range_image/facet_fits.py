@@ -40,8 +40,6 @@ class Facets:
         By how much more larger windows leave, in the lower quartile: low-frequency noise.
     cell : (int, int)
         Rows and columns of pixels of a cell.
-    cell_of : ((H,) int64, (W,) int64)
-        In which row of cells each row of pixels lies, and in which column: kernels look up what is slow to divide.
     stretch : float
         Height of a pixel over its width.
     median_noise : float
@@ -55,7 +53,6 @@ class Facets:
     noise: np.ndarray
     ratio: np.ndarray
     cell: tuple[int, int]
-    cell_of: tuple[np.ndarray, np.ndarray]
     stretch: float
     median_noise: float
     white: bool
@@ -80,8 +77,7 @@ def fit_facets(rays: Rays) -> Facets:
         fitted = few & np.isfinite(left)
         ratio.append(max(float(np.quantile(left[fitted] / noise[fitted], _USUAL)), 1.0) if fitted.any() else 1.0)
     white = is_white(rays, noise, cell, median=median, num_seen=int(np.count_nonzero(seen)))
-    cell_of = np.arange(rays.near.shape[0]) // cell[0], np.arange(rays.near.shape[1]) // cell[1]
-    return Facets(ray, plane, noise, np.array(ratio), cell, cell_of, stretch, median, white)
+    return Facets(ray, plane, noise, np.array(ratio), cell, stretch, median, white)
 
 
 def _stretched(stretch: float) -> tuple[int, int]:

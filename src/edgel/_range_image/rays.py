@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from edgel._kernels.parallel import kernel, run_slices
+from edgel._neighbors.kdtree import bounds
 from edgel._range_image.range_image import RangeImage
 
 APART = 1.7  # times the pitch along lines, from which lines (of a spinning sensor) lie far apart
@@ -95,7 +96,8 @@ def trace_rays(image: RangeImage, xyz: np.ndarray) -> Rays:
         axes, origin = np.eye(3), image.viewpoint
     else:
         # The middle of the box, since a mean would depend on the order of the points in its last digit.
-        origin = np.array([(each.min() + each.max()) / 2 if len(xyz) else 0.0 for each in xyz.T])
+        low, high = bounds(xyz) if len(xyz) else np.zeros((2, 3))
+        origin = (low + high) / 2
         forward = image.direction
         right = np.cross(forward, np.eye(3)[np.argmin(np.abs(forward))])
         right /= np.linalg.norm(right)

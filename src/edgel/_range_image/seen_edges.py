@@ -116,7 +116,7 @@ class SeenEdges:
         planes = np.full((len(edge), 3), np.nan)
         rays, facets, index = self.rays, self.facets, self.image.index
         run_slices(
-            _own_planes, len(index), index, place, rays.near, rays.ray, facets.plane[0], facets.cell_of, planes, size=64
+            _own_planes, len(index), index, place, rays.near, rays.ray, facets.plane[0], facets.cell, planes, size=64
         )
         normals, _ = rays.planes(planes)
         return np.where(inside_of(normals, xyz[edge], viewpoint)[:, None], -normals, normals)
@@ -180,13 +180,13 @@ def _pixels_of(folds: Folds, facets: Facets, near: np.ndarray) -> tuple[np.ndarr
 
 
 @kernel
-def _own_planes(start, stop, index, place, near, ray, plane, cell_of, planes):
+def _own_planes(start, stop, index, place, near, ray, plane, cell, planes):
     for row in range(start, stop):
         for col in range(index.shape[1]):
             at = place[index[row, col]] if index[row, col] >= 0 else -1
             if at < 0:
                 continue
-            i, j, misfit = own_plane(row, col, near, ray, plane, cell_of)
+            i, j, misfit = own_plane(row, col, near, ray, plane, cell)
             if misfit < np.inf:
                 for k in range(3):
                     planes[at, k] = plane[k, i, j]

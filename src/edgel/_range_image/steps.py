@@ -49,7 +49,7 @@ def find_steps(rays: Rays, facets: Facets, void: np.ndarray) -> tuple[np.ndarray
     bridged = [int(BRIDGED * min(rays.pitch) / rays.pitch[1 - way] + 0.5) for way in (0, 1)]
     for way in (0, 1):  # a pixel belongs to pairs of two rows: bands of the second way are columns
         run_slices(
-            _steps, shape[way], way, rays.near, rays.ray, facets.plane[0], facets.noise, facets.cell_of, facets.cell[1],
+            _steps, shape[way], way, rays.near, rays.ray, facets.plane[0], facets.noise, facets.cell,
             max(rays.side, rays.pitch[1 - way]), rays.central, sure, void, bridged[way], smear, step, side,
             size=(1 + 3 * way) * _BAND,
         )  # fmt: skip
@@ -65,14 +65,14 @@ def _chance(rays: Rays, facets: Facets) -> float:
     places = even_places(rays.near.shape)
     values = np.full((len(places), 2), np.nan, np.float32)
     run_slices(
-        _sample, len(places), places, rays.near, rays.ray, facets.plane[0], facets.noise, facets.cell_of, values,
+        _sample, len(places), places, rays.near, rays.ray, facets.plane[0], facets.noise, facets.cell, values,
         size=128,
     )  # fmt: skip
     return spread(values, *_SPREAD)
 
 
 @kernel
-def _sample(start, stop, places, near, ray, plane, noise, cell_of, values):
+def _sample(start, stop, places, near, ray, plane, noise, cell, values):
     height, width = near.shape
     for n in range(start, stop):
         row, col = places[n]
@@ -82,22 +82,22 @@ def _sample(start, stop, places, near, ray, plane, noise, cell_of, values):
             r, c = (row, col + 2 * SMEAR + 1) if way == 0 else (row + 2 * SMEAR + 1, col)
             if r >= height or c >= width or near[r, c] != near[r, c]:
                 continue
-            i, j, _ = own_plane(row, col, near, ray, plane, cell_of)
-            a, b, _ = own_plane(r, c, near, ray, plane, cell_of)
+            i, j, _ = own_plane(row, col, near, ray, plane, cell)
+            a, b, _ = own_plane(r, c, near, ray, plane, cell)
             if i < 0 or a < 0:
                 continue
             step = 0.0
             for k in range(3):
                 step += (plane[k, a, b] - plane[k, i, j]) * ray[row, col, k]
-            left = max(plane[3, i, j], plane[3, a, b], noise[cell_of[0][row], cell_of[1][col]])
+            left = max(plane[3, i, j], plane[3, a, b], noise[row // cell[0], col // cell[1]])
             if left > 0.0:
                 values[n, way] = abs(step) / left
 
 
 @part
-def own_plane(row, col, near, ray, plane, cell_of):
+def own_plane(row, col, near, ray, plane, cell):
     """Cell of the window that fits a pixel's own side best, and the plane's misfit there and in all, squared."""
-    i, j = cell_of[0][row], cell_of[1][col]
+    i, j = row // cell[0], col // cell[1]
     best, where = np.float32(np.inf), -1
     x, y, z, own = ray[row, col, 0], ray[row, col, 1], ray[row, col, 2], near[row, col]
     for down in range(-NEARBY, NEARBY + 1):
@@ -126,13 +126,13 @@ def _held(row, col, gap, near):
 
 
 @part
-def _leap(row, col, r, c, dr, dc, near, ray, plane, noise, cell_of):
+def _leap(row, col, r, c, dr, dc, near, ray, plane, noise, cell):
     """Step that neither side's slope explains, and its noise."""
     height, width = near.shape
     gap = near[r, c] - near[row, col]
-    sigma = noise[cell_of[0][row], cell_of[1][col]]
-    i, j, misfit = own_plane(row, col, near, ray, plane, cell_of)
-    a, b, other = own_plane(r, c, near, ray, plane, cell_of)
+    sigma = noise[row // cell[0], col // cell[1]]
+    i, j, misfit = own_plane(row, col, near, ray, plane, cell)
+    a, b, other = own_plane(r, c, near, ray, plane, cell)
     limit = 16 * sigma * sigma
     if i >= 0 and a >= 0 and misfit < limit and other < limit:
         here = there = 0.0
@@ -161,19 +161,19 @@ def _leap(row, col, r, c, dr, dc, near, ray, plane, noise, cell_of):
 
 @kernel
 def _steps(
-    start, stop, way, near, ray, plane, noise, cell_of, wide, unit, central, sure, void, bridged, smear, step, side
+    start, stop, way, near, ray, plane, noise, cell, unit, central, sure, void, bridged, smear, step, side
 ):  # fmt: skip
     height, width = near.shape
     dr, dc = (0, 1) if way == 0 else (1, 0)
     rows = (start, stop) if way == 0 else (0, height)
     cols = (0, width) if way == 0 else (start, stop)
     for row in range(rows[0], rows[1]):
-        i = cell_of[0][row]
-        for j in range(cell_of[1][cols[0]], cell_of[1][cols[1] - 1] + 1):
+        i = row // cell[0]
+        for j in range(cols[0] // cell[1], (cols[1] - 1) // cell[1] + 1):
             # The window around a pixel beside a step lies on both sides of it: where one plane explains it, none is.
             if plane[3, i, j] < EXPLAINED * noise[i, j]:
                 continue
-            for col in range(max(j * wide, cols[0]), min((j + 1) * wide, cols[1])):
+            for col in range(max(j * cell[1], cols[0]), min((j + 1) * cell[1], cols[1])):
                 here = near[row, col]
                 if here != here:
                     continue
@@ -195,7 +195,7 @@ def _steps(
                     whole = (near[u, v] - near[p, q]) * (1.0 if gap > 0 else -1.0)
                     if not whole > max(GAP * spacing, sure * sigma / 2):  # NaN too
                         continue
-                    leap, left = _leap(p, q, u, v, dr, dc, near, ray, plane, noise, cell_of)
+                    leap, left = _leap(p, q, u, v, dr, dc, near, ray, plane, noise, cell)
                     value = max(value, min(leap / max(STEP * spacing, sure * left), whole / (GAP * spacing)))
                 if value > step[row, col]:
                     step[row, col], side[row, col] = value, 4 if gap > 0 else 2

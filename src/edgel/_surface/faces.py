@@ -52,10 +52,10 @@ def localize(
     Faces
         One row an edge point; where neither crease nor end is known the position is the point itself.
     """
-    faces = Faces.of_points(index.by_point()[edge], planes.normals)
+    faces = Faces.of_points(index.at(index.places_of(edge)), planes.normals)
     noise = np.sqrt(planes.residual / max(num_neighbors - 3, 1))
     _put_rims(faces, index, edge, planes, noise, ends, outermost)
-    found = crease_faces(refined(smoothed, creases), smoothed.by_point()[creases.points], viewpoint)
+    found = crease_faces(refined(smoothed, creases), smoothed.at(smoothed.places_of(creases.points)), viewpoint)
     known = creases.evidence.placed & (found.convex != 0)
     faces.put(np.searchsorted(edge, creases.points[known]), found, known)
     return faces

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel
-from edgel._kernels.union_find import find_root
+from edgel._kernels.union_find import keep_linked
 from edgel._neighbors.kdtree import NeighborIndex
 from edgel._neighbors.knn import knn
 from edgel._neighbors.queries import at_points
@@ -52,7 +51,7 @@ def strengths(index: NeighborIndex, points: np.ndarray, probability: np.ndarray)
     everywhere, row = np.zeros(len(index)), np.full(len(index), -1)
     everywhere[points], row[points[on]] = probability, np.arange(len(on))
     chained = np.empty(len(on), np.bool_)
-    _chain(row[nearest], probability[on] >= STRONG, chained)
+    keep_linked(row[nearest], probability[on] >= STRONG, chained)
     share = np.clip((even - VAGUE[0]) / (VAGUE[1] - VAGUE[0]), 0.0, 1.0)
     likeliest = probability[on] >= everywhere[nearest].max(axis=1)
     shown = on[chained & (likeliest | (probability[on] >= even + share * (SURE - even)))]
@@ -76,20 +75,3 @@ def even_probability(probability: np.ndarray) -> float:
 def strength_of(probability: np.ndarray, even: float) -> np.ndarray:
     """Turn probabilities into strengths, `even` into one half; odds keep their ratio."""
     return probability * (1 - even) / (probability * (1 - even) + even * (1 - probability))
-
-
-@kernel
-def _chain(nearest, strong, chained):
-    """Tell which of some points (M,) are linked to a strong one by their nearest (M, k), -1 for others."""
-    parents = np.arange(len(nearest))
-    for row in range(len(nearest)):
-        for other in nearest[row]:
-            if other >= 0:
-                a, b = find_root(parents, row), find_root(parents, other)
-                parents[max(a, b)] = min(a, b)
-    chained[:] = False
-    for row in range(len(nearest)):
-        if strong[row]:
-            chained[find_root(parents, row)] = True
-    for row in range(len(nearest)):
-        chained[row] = chained[find_root(parents, row)]

@@ -54,9 +54,9 @@ def find_rims(
     if len(points) and len(outermost) >= COUNTS[0]:
         k = min(AROUND, len(index))
         visit_neighbors(_find_across, at_points(index, points), index, k, normals, noise, across)
-        place = np.argsort(index.order)
-        alone = build_index(index.xyz[:, place[outermost]].T.copy())
-        k, queries = min(COUNTS[-1], len(outermost)), anywhere(index.xyz[:, place[points]].T.copy())
+        alone, asked = (index.at(index.places_of(rows)) for rows in (outermost, points))
+        alone, queries = build_index(alone), anywhere(asked)
+        k = min(COUNTS[-1], len(outermost))
         visit_neighbors(_fit_rims, queries, alone, k, normals, across, rims)
     return rims
 

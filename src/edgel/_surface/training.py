@@ -87,6 +87,4 @@ def add_context(
     Takes the coordinates (N, 3) of the index, smoothed where the cloud was; see `edgel._surface.evidence.with_context`.
     """
     index = build_index(np.ascontiguousarray(xyz))
-    place = np.empty(len(index), np.int64)
-    place[index.order] = np.arange(len(index))
-    return with_context(index, place[points], evidence, crease, outline)
+    return with_context(index, index.places_of(points), evidence, crease, outline)
