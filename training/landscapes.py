@@ -1,6 +1,6 @@
-"""Landscapes to train on, as an aircraft sees them: ground, roofs, boxes on them, walls that few beams reach, and trees.
+"""Landscapes to train on, as seen from the air: ground, roofs, boxes on them, walls that few beams reach, and trees.
 
-Roofs meet in creases, end in steps of height, and are sampled along lines, in strips that overlap. Leaves have no edges.
+Roofs meet in creases, end in steps of height, and are sampled along lines in strips that overlap. Leaves have no edge.
 """
 
 from __future__ import annotations
