@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -51,6 +51,12 @@ class Faces:
         """Overwrite some rows (K,) with rows `which` (K,) of other faces."""
         for name in Faces.__dataclass_fields__:
             getattr(self, name)[rows] = getattr(other, name)[which]
+
+    def along(self, xyz: np.ndarray, rows: np.ndarray) -> Self:
+        """Return the faces of rows (K,) at points (K, 3) beside them: the line is straight, all else is the same."""
+        taken = type(self)(*(getattr(self, name)[rows] for name in Faces.__dataclass_fields__))
+        on = ((xyz - taken.position) * np.nan_to_num(taken.direction)).sum(axis=1, keepdims=True)
+        return replace(taken, position=taken.position + on * np.nan_to_num(taken.direction))
 
 
 def inside_of(out: np.ndarray, xyz: np.ndarray, viewpoint: np.ndarray | None) -> np.ndarray:

@@ -12,10 +12,12 @@ from edgel._neighbors.normals import fit_planes, towards
 from edgel._neighbors.queries import at_points
 from edgel._stages import Stages
 from edgel._surface.classify import Classification, classify
+from edgel._surface.coarser import CELL, FAINT, FEWEST, Carried, apart, carry, means_of_cells
 from edgel._surface.faces import localize
 from edgel._surface.line import Strengths, strengths
+from edgel._surface.plane_scales import SCALES
 from edgel._surface.screen import Screening, screen
-from edgel._surface.smoothing import smoothed
+from edgel._surface.smoothing import cloud_spacing, smoothed
 from edgel._surface.statistics import cloud_statistics
 from edgel.edges import OUTLINES, EdgeKind
 
@@ -29,11 +31,13 @@ class Surface:
     ----------
     xyz : (N, 3) float64, finite
     stages : Stages
+    coarsest : bool
+        Whether no coarser look is taken, however noisy the cloud is.
     """
 
-    def __init__(self, xyz: np.ndarray, stages: Stages) -> None:
+    def __init__(self, xyz: np.ndarray, stages: Stages, *, coarsest: bool = False) -> None:
         self.xyz = xyz
-        self._stages = stages
+        self._stages, self._coarsest = stages, coarsest
 
     @cached_property
     def index(self) -> NeighborIndex:
@@ -68,11 +72,42 @@ class Surface:
             return classify(index, screening)
 
     @cached_property
-    def strengths(self) -> Strengths:
-        """How marked the edges are there."""
+    def _own_strengths(self) -> Strengths:
+        """How marked the edges are by their own neighbours."""
         index, found = self.smoothed, self.classified
         with self._stages("classification"):
             return Strengths(found.points, *(strengths(index, found.points, p) for p in (found.crease, found.outline)))
+
+    @property
+    def strengths(self) -> Strengths:
+        """How marked the edges are there."""
+        found = self._own_strengths
+        return found if self._carried is None else found.join(self._carried.strengths)
+
+    @cached_property
+    def _cell(self) -> float:
+        """Side of the cells of the coarser look."""
+        return CELL * cloud_spacing(self.index)
+
+    @cached_property
+    def _coarser(self) -> Surface | None:
+        """The means of cells, where the noise asks for them."""
+        if self._coarsest or self.smoothed is self.index:
+            return None
+        xyz = means_of_cells(self.smoothed, self._cell)
+        return Surface(xyz, self._stages, coarsest=True) if len(xyz) >= FEWEST else None
+
+    @cached_property
+    def _carried(self) -> Carried | None:
+        """What the coarser look shows where this one shows nothing."""
+        if (coarser := self._coarser) is None:
+            return None
+        index, found = self.smoothed, self._own_strengths
+        seen = coarser.strengths
+        seen = seen.take(seen.strongest >= FAINT)
+        faces = coarser.faces(seen.points, seen.kinds(FAINT), SCALES[1], None)
+        with self._stages("coarser look"):
+            return apart(index, self._cell, found, carry(index, self._cell, seen, faces))
 
     def faces(self, edge: np.ndarray, kind: np.ndarray, num_neighbors: int, viewpoint: np.ndarray | None) -> Faces:
         """Say where the edge runs at points (E,), ascending, of kinds (E,), and how the surface lies on either side.
@@ -84,4 +119,12 @@ class Surface:
         creases = self.classified.take(np.isin(self.classified.points, edge[(kind & EdgeKind.CREASE) > 0]))
         ends = (kind & OUTLINES) > 0
         outermost = self.classified.points[self.classified.outline > SURE]
-        return localize(self.index, self.smoothed, edge, planes, num_neighbors, creases, ends, outermost, viewpoint)
+        faces = localize(self.index, self.smoothed, edge, planes, num_neighbors, creases, ends, outermost, viewpoint)
+        if self._carried is not None:
+            rows, sources = self._carried.seen_at(edge, self._own_strengths)
+            asked, of_source = np.unique(sources, return_inverse=True)
+            strengths = self._coarser.strengths
+            kinds = strengths.take(np.searchsorted(strengths.points, asked)).kinds(FAINT)
+            found = self._coarser.faces(asked, kinds, num_neighbors, viewpoint)
+            faces.put(rows, found.along(self.xyz[edge[rows]], of_source), slice(None))
+        return faces
