@@ -18,6 +18,8 @@ class Faces:
         Foot of the point on the line in which the faces meet, or on that along which the surface ends.
     position_std : (M,) float64
         Root of the mean squared distance, in the cloud's unit, at which that line is to be expected from there.
+    scale : (M,) float64
+        Radius, in the cloud's unit, of the smallest neighbourhood that shows most of the edge.
     direction : (M, 3) float64
         Unit tangent of that line.
     normals : (M, 2, 3) float64
@@ -30,6 +32,7 @@ class Faces:
 
     position: np.ndarray
     position_std: np.ndarray
+    scale: np.ndarray
     direction: np.ndarray
     normals: np.ndarray
     angle: np.ndarray
@@ -41,6 +44,7 @@ class Faces:
         return cls(
             position=xyz.copy(),
             position_std=np.full(len(xyz), np.nan),
+            scale=np.full(len(xyz), np.nan),
             direction=np.full((len(xyz), 3), np.nan),
             normals=np.stack([normals, np.full_like(normals, np.nan)], axis=1),
             angle=np.full(len(xyz), np.nan),

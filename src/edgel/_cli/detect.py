@@ -112,6 +112,15 @@ def detect(
             metavar="SPACINGS",
         ),
     ] = None,
+    max_scale: Annotated[
+        float | None,
+        options.option(
+            edgel.detect,
+            "max_scale",
+            "Look for soft edges too, as of fillets or worn parts, at twice the scale, four times, up to this.",
+            metavar="SPACINGS",
+        ),
+    ] = None,
     min_angle: Annotated[
         float | None,
         options.own(
@@ -168,6 +177,7 @@ def detect(
         viewpoint=viewpoint,
         orient=orient,
         scale=scale,
+        max_scale=max_scale,
         width=width,
         height=height,
         kernel_size=kernel_size,

@@ -19,6 +19,7 @@ from edgel._surface.two_planes import FITS
 
 MAX_AWAY = 1.5  # spacings: a line farther from the point is not its edge
 MIN_TURN = math.radians(12.0)  # of two planes that make an edge
+_MOST = 0.7  # of the turn that any neighbourhood shows
 _FLOOR = 0.02  # spacings: residuals below it do not make one fit better than another
 _COS_MIN = math.cos(math.radians(20.0))  # of two planes through a point, whose angle is at least this
 
@@ -94,6 +95,17 @@ def _best_fit(features: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     error[(away > MAX_AWAY) | ~(turn > MIN_TURN)] = np.inf
     best = error.argmin(axis=1)
     return best, np.isfinite(error[np.arange(len(error)), best])
+
+
+def support(evidence: Evidence) -> np.ndarray:
+    """Return the least number of neighbours, of those of `FITS`, that show most of each edge's turn, (M,) int64.
+
+    Sharp edges show it to the few nearest; one that is rounded only to as many as reach over its bend.
+    """
+    fits = evidence.features[:, POINT.block("two_planes")].reshape(-1, len(FITS), two_planes.NUM_FEATURES)
+    turn = np.where(fits[:, :, two_planes.FOOT_AWAY] <= MAX_AWAY, fits[:, :, two_planes.TURN], 0.0)
+    shown = turn >= _MOST * turn.max(axis=1, keepdims=True)
+    return np.array([count for count, _ in FITS])[shown.argmax(axis=1)]
 
 
 def with_context(

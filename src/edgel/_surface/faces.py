@@ -6,13 +6,15 @@ import numpy as np
 
 from edgel._faces import Faces, facing
 from edgel._neighbors.kdtree import NeighborIndex
-from edgel._neighbors.knn import visit_neighbors
+from edgel._neighbors.knn import knn, visit_neighbors
 from edgel._neighbors.normals import Normals
 from edgel._neighbors.queries import at_points
 from edgel._surface import rims
 from edgel._surface.classify import Classification
 from edgel._surface.curved_faces import COUNTS, EDGE, FIRST, LINE, POSITION, SECOND, STD, fit_curved_faces
-from edgel._surface.evidence import MAX_AWAY, MIN_TURN
+from edgel._surface.evidence import MAX_AWAY, MIN_TURN, support
+
+DISC = 16  # neighbours whose disc tells the density
 
 
 def localize(
@@ -57,7 +59,13 @@ def localize(
     _put_rims(faces, index, edge, planes, noise, ends, outermost)
     found = crease_faces(refined(smoothed, creases), smoothed.at(smoothed.places_of(creases.points)), viewpoint)
     known = creases.evidence.placed & (found.convex != 0)
-    faces.put(np.searchsorted(edge, creases.points[known]), found, known)
+    rows = np.searchsorted(edge, creases.points[known])
+    faces.put(rows, found, known)
+    # Radii by the density around the point, as the disc of its 16 nearest has it: 16 tell where a surface ends.
+    count = np.full(len(edge), DISC)
+    count[rows] = support(creases.evidence.take(known))
+    disc = knn(index, at_points(index, edge), min(DISC, len(index))).distances[:, -1]
+    faces.scale[:] = disc * np.sqrt(count / DISC)
     return faces
 
 
@@ -84,6 +92,7 @@ def crease_faces(edges: np.ndarray, xyz: np.ndarray, viewpoint: np.ndarray | Non
     return Faces(
         position=xyz + foot * unknown,
         position_std=edges[:, STD] * unknown[:, 0],
+        scale=np.full(len(xyz), np.nan),
         direction=line * unknown,
         normals=normals * unknown[:, None],
         angle=turn * unknown[:, 0],
