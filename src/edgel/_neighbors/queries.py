@@ -36,8 +36,9 @@ class Queries:
 
     Attributes
     ----------
-    xyz : (3, M) float64
-        Coordinates, one axis a row.
+    xyz : (3, M) or (6, M) float64
+        Coordinates, one axis a row; below them, where neighbours are wanted in a metric of each query's own, its
+        stretch: see `edgel._neighbors.stretched`.
     targets : (M,) int64
         Where the results of each query go: a permutation.
     """
@@ -45,13 +46,18 @@ class Queries:
     xyz: np.ndarray
     targets: np.ndarray
 
+    @property
+    def are_stretched(self) -> bool:
+        """Whether queries have metrics of their own."""
+        return len(self.xyz) > 3
+
     def __len__(self) -> int:
         return len(self.targets)
 
     @property
     def arrays(self) -> QueryArrays:
         """The arrays that kernels take."""
-        x, y, z = self.xyz
+        x, y, z = self.xyz[:3]
         return QueryArrays(x, y, z, self.targets)
 
 
@@ -71,12 +77,18 @@ def every_place(index: NeighborIndex) -> Queries:
     return Queries(index.xyz, np.arange(len(index)))
 
 
-def at_places(index: NeighborIndex, places: np.ndarray, targets: np.ndarray | None = None) -> Queries:
+def at_places(
+    index: NeighborIndex, places: np.ndarray, targets: np.ndarray | None = None, stretch: np.ndarray | None = None
+) -> Queries:
     """Ask at some places (M,) of an index, ascending, which lie in its order already; no tree of their own is needed.
 
-    The results are in the order of the places, unless `targets` (M,) says where each goes.
+    The results are in the order of the places, unless `targets` (M,) says where each goes. Takes the stretch (3, N) at
+    every place, where there is one.
     """
-    return Queries(index.xyz.take(places, axis=1), np.arange(len(places)) if targets is None else targets)
+    xyz = index.xyz.take(places, axis=1)
+    if stretch is not None:
+        xyz = np.concatenate([xyz, stretch.take(places, axis=1)])
+    return Queries(xyz, np.arange(len(places)) if targets is None else targets)
 
 
 def at_points(index: NeighborIndex, points: np.ndarray) -> Queries:

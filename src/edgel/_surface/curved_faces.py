@@ -15,7 +15,7 @@ from edgel._kernels.cholesky import explain, factorize, solve, variance_of
 from edgel._kernels.parallel import kernel, summing_kernel
 from edgel._neighbors.spacing import disc_spacing
 from edgel._surface import hinge
-from edgel._surface.neighborhood import relative
+from edgel._neighbors.neighborhood import relative
 
 COUNTS, SMALLER = (24, 48, 96), (12, 8)
 """Neighbours of the fits: the first tells both faces' twelve unknowns and the noise, others are tried while surer."""

@@ -12,7 +12,7 @@ from edgel._neighbors.kdtree import NeighborIndex, build_index
 from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.queries import anywhere, at_points
 from edgel._neighbors.spacing import disc_spacing
-from edgel._surface.neighborhood import relative
+from edgel._neighbors.neighborhood import relative
 
 AROUND = 16  # neighbours whose middle says on which side the surface lies
 COUNTS = (7, 17)  # outermost points of each fit; that which is surest of its position is taken

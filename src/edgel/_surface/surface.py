@@ -10,6 +10,7 @@ from edgel._faces import Faces
 from edgel._neighbors.kdtree import NeighborIndex, build_index
 from edgel._neighbors.normals import fit_planes, towards
 from edgel._neighbors.queries import at_points
+from edgel._neighbors.scan_lines import scan_line_stretch
 from edgel._stages import Stages
 from edgel._surface.classify import Classification, classify
 from edgel._surface.faces import localize
@@ -53,7 +54,8 @@ class Surface:
         """Where an edge could be."""
         index = self.smoothed
         with self._stages("screening"):
-            return screen(index, cloud_statistics(index))
+            stretch = scan_line_stretch(index)
+            return screen(index, cloud_statistics(index, stretch), stretch)
 
     @property
     def normals(self) -> np.ndarray:

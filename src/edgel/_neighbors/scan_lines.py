@@ -1,0 +1,96 @@
+"""Scan lines: where points lie far closer along lines than these lie apart, and how far to stretch what is along them.
+
+The nearest of a point on a scanner's line, or on a ring of a spinning one, lie on its own line and know nothing of the
+surface across it. Stretched along the line as `edgel._neighbors.stretched` does, they lie all round it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from edgel._kernels.eigen import smallest_eigenpair
+from edgel._kernels.moments import add_moments
+from edgel._kernels.parallel import kernel
+from edgel._neighbors.kdtree import NeighborIndex
+from edgel._neighbors.knn import visit_neighbors
+from edgel._neighbors.neighborhood import relative
+from edgel._neighbors.queries import at_places, every_place
+
+STRAIGHT = ((8, 0.15), (16, 0.3))
+"""Neighbours of a point, and how far across their main direction, over along it, they spread at most on a line."""
+AROUND = 16  # neighbours among which the straightest stretch of line is looked for
+AREA = 64  # neighbours whose disc tells how much area a point stands for: lines apart by half their number it misses
+LEAST, MOST = 2.5, 24.0  # distance of lines over that of the points on them
+_ON_LINES = 1 / 3  # share of the neighbours that have to lie on lines: chance seldom does that
+_CLOUD = 0.1  # share of a cloud's points that have to, or it has no lines
+_SAMPLE = 4_000  # points that tell whether it has
+_EVEN = 0.2  # of the most spread there may be on a line: below it one stretch is as straight as the other
+_U, _SPREAD, _RATIO, _LINE = 0, 3, 4, 5  # columns of a line: direction, spread over its most, distance of lines
+
+
+def scan_line_stretch(index: NeighborIndex) -> np.ndarray | None:
+    """Return the stretch (3, N) float64 at each place, 0 where points lie on no lines; None where the cloud has none.
+
+    Stretched, points of a line lie as far apart as the lines. A point takes the direction of the straightest stretch
+    of line near it: where a line turns round a crease it is that of one face.
+    """
+    some = index.sampled(_SAMPLE)
+    if len(index) < AREA or np.mean(_lines(index, some)[:, _SPREAD] < 1.0) < _CLOUD:
+        return None
+    lines, stretch = _lines(index, np.arange(len(index))), np.zeros((3, len(index)))
+    visit_neighbors(_choose, every_place(index), index, AROUND, lines, stretch)
+    return stretch if stretch.any() else None
+
+
+def _lines(index: NeighborIndex, places: np.ndarray) -> np.ndarray:
+    """Fit a line at some places (M,), ascending: (M, 5) float64."""
+    lines = np.empty((len(places), _LINE))
+    visit_neighbors(_fit_lines, at_places(index, places), index, AREA, np.array(STRAIGHT), lines)
+    return lines
+
+
+@kernel
+def _fit_lines(first, places, squared, queries, targets, xyz, straight, lines):
+    """Write direction, spread, and how many times farther apart than its points lines lie, of the straightest fit."""
+    vectors, sums = np.empty((3, places.shape[1])), np.empty(9)
+    for q in range(places.shape[0]):
+        relative(places[q], queries, first + q, xyz, vectors)
+        line, done = lines[targets[first + q]], 0
+        line[:], line[_SPREAD], sums[:] = 0.0, np.inf, 0.0
+        for s in range(len(straight)):
+            k = int(straight[s, 0])
+            add_moments(vectors, done, k, sums)
+            done = k
+            cx, cy, cz = sums[0] / k, sums[1] / k, sums[2] / k
+            xx, xy, xz = sums[3] / k - cx * cx, sums[4] / k - cx * cy, sums[5] / k - cx * cz
+            yy, yz, zz = sums[6] / k - cy * cy, sums[7] / k - cy * cz, sums[8] / k - cz * cz
+            # The largest eigenvector of a matrix is the smallest one of its negative.
+            largest, middle, x, y, z = smallest_eigenpair(-xx, -xy, -xz, -yy, -yz, -zz)
+            if not largest < 0.0:
+                continue
+            spread = math.sqrt(max(middle / largest, 0.0)) / straight[s, 1]
+            if spread < line[_SPREAD]:
+                apart2 = -12.0 * largest / (k * k - 1.0)  # of points evenly along the line
+                line[_U], line[_U + 1], line[_U + 2], line[_SPREAD] = x, y, z, spread
+                line[_RATIO] = math.pi * squared[q, AREA - 1] / (AREA * apart2)
+
+
+@kernel
+def _choose(first, places, squared, queries, targets, xyz, lines, stretch):
+    """Write the stretch of the straightest line among the neighbours, the nearest of those that are as straight."""
+    for q in range(places.shape[0]):
+        best, least, count = -1, np.inf, 0
+        for i in range(places.shape[1]):
+            spread = lines[places[q, i], _SPREAD]
+            count += spread < 1.0
+            spread = max(spread, _EVEN)
+            if spread < least:
+                best, least = places[q, i], spread
+        if best < 0 or count < _ON_LINES * places.shape[1]:
+            continue
+        ratio = lines[best, _RATIO]
+        if LEAST <= ratio <= MOST:
+            for axis in range(3):
+                stretch[axis, targets[first + q]] = (ratio - 1.0) * lines[best, _U + axis]
