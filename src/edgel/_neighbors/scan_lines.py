@@ -16,18 +16,23 @@ from edgel._kernels.parallel import kernel
 from edgel._neighbors.kdtree import NeighborIndex
 from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.neighborhood import relative
-from edgel._neighbors.queries import at_places, every_place
+from edgel._neighbors.queries import Queries, at_places, every_place
 
-STRAIGHT = ((8, 0.15), (16, 0.3))
+STRAIGHT = ((8, 0.2), (16, 0.35))
 """Neighbours of a point, and how far across their main direction, over along it, they spread at most on a line."""
-AROUND = 16  # neighbours among which the straightest stretch of line is looked for
+AROUND = 24  # neighbours among which the straightest stretch of line is looked for
 AREA = 64  # neighbours whose disc tells how much area a point stands for: lines apart by half their number it misses
-LEAST, MOST = 2.5, 24.0  # distance of lines over that of the points on them
-_ON_LINES = 1 / 3  # share of the neighbours that have to lie on lines: chance seldom does that
+LEAST, MOST = 2.5, 32.0  # distance of lines over that of the points on them
+FULL = 0.5
+ABREAST = 24  # neighbours, stretched by the most, among which the lines on either side are looked for
+_OPPOSITE = -0.85  # cosine between the ways to them, at most
+_OWN = (1.5, 3.0)  # distances of points, and deviations from the line, within which a point is on it
+_ON_LINES = 1 / 12  # share of the neighbours that have to lie on lines: chance seldom does that
 _CLOUD = 0.1  # share of a cloud's points that have to, or it has no lines
 _SAMPLE = 4_000  # points that tell whether it has
 _EVEN = 0.2  # of the most spread there may be on a line: below it one stretch is as straight as the other
-_U, _SPREAD, _RATIO, _LINE = 0, 3, 4, 5  # columns of a line: direction, spread over its most, distance of lines
+_U, _SPREAD, _RATIO, _OFF, _APART, _LINE = 0, 3, 4, 5, 6, 7
+"""Columns of a line: direction, spread over its most, `LEAST` and `MOST` of it, deviation from it, distance of points."""
 
 
 def scan_line_stretch(index: NeighborIndex) -> np.ndarray | None:
@@ -45,9 +50,13 @@ def scan_line_stretch(index: NeighborIndex) -> np.ndarray | None:
 
 
 def _lines(index: NeighborIndex, places: np.ndarray) -> np.ndarray:
-    """Fit a line at some places (M,), ascending: (M, 5) float64."""
+    """Fit a line at some places (M,), ascending: (M, 7) float64."""
     lines = np.empty((len(places), _LINE))
     visit_neighbors(_fit_lines, at_places(index, places), index, AREA, np.array(STRAIGHT), lines)
+    on = np.flatnonzero(lines[:, _SPREAD] < 1.0)
+    if len(on):
+        away = np.concatenate([index.xyz.take(places[on], axis=1), (MOST - 1.0) * lines[on, :_SPREAD].T])
+        visit_neighbors(_look_abreast, Queries(away, on), index, min(ABREAST, len(index)), lines)
     return lines
 
 
@@ -75,6 +84,37 @@ def _fit_lines(first, places, squared, queries, targets, xyz, straight, lines):
                 apart2 = -12.0 * largest / (k * k - 1.0)  # of points evenly along the line
                 line[_U], line[_U + 1], line[_U + 2], line[_SPREAD] = x, y, z, spread
                 line[_RATIO] = math.pi * squared[q, AREA - 1] / (AREA * apart2)
+                line[_OFF], line[_APART] = math.sqrt(max(-middle, 0.0)), math.sqrt(apart2)
+
+
+@kernel
+def _look_abreast(first, places, squared, queries, targets, xyz, lines):
+    """Write how many times farther apart than its points the lines on either side of one lie, where there are two.
+
+    The disc around a point holds both sides of a thin plate; the lines on either side belong to its own.
+    """
+    k = places.shape[1]
+    across = np.empty((4, k))
+    for q in range(places.shape[0]):
+        line = lines[targets[first + q]]
+        own, count, least = max(_OWN[0] * line[_APART], _OWN[1] * line[_OFF]), 0, np.inf
+        for i in range(1, k):
+            along, length = 0.0, 0.0
+            for axis in range(3):
+                across[axis, count] = xyz[axis, places[q, i]] - queries[axis, first + q]
+                along += across[axis, count] * line[_U + axis]
+            for axis in range(3):
+                across[axis, count] -= along * line[_U + axis]
+                length += across[axis, count] ** 2
+            across[3, count] = math.sqrt(length)
+            count += across[3, count] > own
+        for i in range(count):
+            for j in range(i):
+                dot = across[0, i] * across[0, j] + across[1, i] * across[1, j] + across[2, i] * across[2, j]
+                if dot < _OPPOSITE * across[3, i] * across[3, j]:
+                    least = min(least, across[3, i] + across[3, j])
+        if least < np.inf:
+            line[_RATIO] = 0.5 * least / line[_APART]
 
 
 @kernel
@@ -93,4 +133,4 @@ def _choose(first, places, squared, queries, targets, xyz, lines, stretch):
         ratio = lines[best, _RATIO]
         if LEAST <= ratio <= MOST:
             for axis in range(3):
-                stretch[axis, targets[first + q]] = (ratio - 1.0) * lines[best, _U + axis]
+                stretch[axis, targets[first + q]] = (max(FULL * ratio, 1.0) - 1.0) * lines[best, _U + axis]
