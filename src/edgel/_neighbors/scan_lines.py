@@ -31,8 +31,9 @@ _ON_LINES = 1 / 12  # share of the neighbours that have to lie on lines: chance 
 _CLOUD = 0.1  # share of a cloud's points that have to, or it has no lines
 _SAMPLE = 4_000  # points that tell whether it has
 _EVEN = 0.2  # of the most spread there may be on a line: below it one stretch is as straight as the other
-_U, _SPREAD, _RATIO, _OFF, _APART, _LINE = 0, 3, 4, 5, 6, 7
-"""Columns of a line: direction, spread over its most, `LEAST` and `MOST` of it, deviation from it, distance of points."""
+_U, _SPREAD, _RATIO, _OFF, _APART, _REACH, _LINE = 0, 3, 4, 5, 6, 7, 8
+"""Columns of a line: direction, spread over its most, distance of lines over that of points, deviation of these from it,
+their distance, and how far away anything matters."""
 
 
 def scan_line_stretch(index: NeighborIndex) -> np.ndarray | None:
@@ -41,16 +42,33 @@ def scan_line_stretch(index: NeighborIndex) -> np.ndarray | None:
     Stretched, points of a line lie as far apart as the lines. A point takes the direction of the straightest stretch
     of line near it: where a line turns round a crease it is that of one face.
     """
-    some = index.sampled(_SAMPLE)
-    if len(index) < AREA or np.mean(_lines(index, some)[:, _SPREAD] < 1.0) < _CLOUD:
+    if not _has_lines(index):
         return None
     lines, stretch = _lines(index, np.arange(len(index))), np.zeros((3, len(index)))
-    visit_neighbors(_choose, every_place(index), index, AROUND, lines, stretch)
+    visit_neighbors(_choose, every_place(index), index, AROUND, lines, stretch, np.empty(0))
     return stretch if stretch.any() else None
 
 
+def stretch_reach(index: NeighborIndex) -> np.ndarray:
+    """Bound how far from each place its stretch depends on other points, (N,) float64, given that the cloud has lines.
+
+    0 where it has none.
+    """
+    reach = np.zeros(len(index))
+    if _has_lines(index):
+        lines, stretch = _lines(index, np.arange(len(index))), np.zeros((3, len(index)))
+        visit_neighbors(_choose, every_place(index), index, AROUND, lines, stretch, reach)
+    return reach
+
+
+def _has_lines(index: NeighborIndex) -> bool:
+    if len(index) < AREA:
+        return False
+    return bool(np.mean(_lines(index, index.sampled(_SAMPLE))[:, _SPREAD] < 1.0) >= _CLOUD)
+
+
 def _lines(index: NeighborIndex, places: np.ndarray) -> np.ndarray:
-    """Fit a line at some places (M,), ascending: (M, 7) float64."""
+    """Fit a line at some places (M,), ascending: (M, 8) float64."""
     lines = np.empty((len(places), _LINE))
     visit_neighbors(_fit_lines, at_places(index, places), index, AREA, np.array(STRAIGHT), lines)
     on = np.flatnonzero(lines[:, _SPREAD] < 1.0)
@@ -67,7 +85,7 @@ def _fit_lines(first, places, squared, queries, targets, xyz, straight, lines):
     for q in range(places.shape[0]):
         relative(places[q], queries, first + q, xyz, vectors)
         line, done = lines[targets[first + q]], 0
-        line[:], line[_SPREAD], sums[:] = 0.0, np.inf, 0.0
+        line[:], line[_SPREAD], line[_REACH], sums[:] = 0.0, np.inf, math.sqrt(squared[q, AREA - 1]), 0.0
         for s in range(len(straight)):
             k = int(straight[s, 0])
             add_moments(vectors, done, k, sums)
@@ -97,6 +115,7 @@ def _look_abreast(first, places, squared, queries, targets, xyz, lines):
     across = np.empty((4, k))
     for q in range(places.shape[0]):
         line = lines[targets[first + q]]
+        line[_REACH] = max(line[_REACH], math.sqrt(squared[q, k - 1]))
         own, count, least = max(_OWN[0] * line[_APART], _OWN[1] * line[_OFF]), 0, np.inf
         for i in range(1, k):
             along, length = 0.0, 0.0
@@ -118,16 +137,22 @@ def _look_abreast(first, places, squared, queries, targets, xyz, lines):
 
 
 @kernel
-def _choose(first, places, squared, queries, targets, xyz, lines, stretch):
-    """Write the stretch of the straightest line among the neighbours, the nearest of those that are as straight."""
+def _choose(first, places, squared, queries, targets, xyz, lines, stretch, reach):
+    """Write the stretch of the straightest line among the neighbours, the nearest of those that are as straight.
+
+    And, unless `reach` is empty, how far away anything matters for it.
+    """
     for q in range(places.shape[0]):
-        best, least, count = -1, np.inf, 0
+        best, least, count, farthest = -1, np.inf, 0, 0.0
         for i in range(places.shape[1]):
             spread = lines[places[q, i], _SPREAD]
             count += spread < 1.0
+            farthest = max(farthest, lines[places[q, i], _REACH])
             spread = max(spread, _EVEN)
             if spread < least:
                 best, least = places[q, i], spread
+        if len(reach):
+            reach[targets[first + q]] = math.sqrt(squared[q, places.shape[1] - 1]) + farthest
         if best < 0 or count < _ON_LINES * places.shape[1]:
             continue
         ratio = lines[best, _RATIO]

@@ -57,12 +57,12 @@ class Screening:
 def screen(
     index: NeighborIndex,
     statistics: np.ndarray,
-    stretch: np.ndarray | None = None,
     forests: Mapping[str, Forest] | None = None,
+    stretch: np.ndarray | None = None,
 ) -> Screening:
     """Gather the cheap evidence of every point that the leaves of the index do not rule out.
 
-    Takes the forests "leaf" and "screen", by default those of the package.
+    Takes the forests "leaf" and "screen", by default those of the package, and the stretch (3, N) on scan lines.
     """
     trees = load_forests() if forests is None else forests
     leaves = describe_leaves(index)

@@ -55,7 +55,7 @@ class Surface:
         index = self.smoothed
         with self._stages("screening"):
             stretch = scan_line_stretch(index)
-            return screen(index, cloud_statistics(index, stretch), stretch)
+            return screen(index, cloud_statistics(index, stretch), stretch=stretch)
 
     @property
     def normals(self) -> np.ndarray:

@@ -79,7 +79,7 @@ def screen_cloud(xyz: np.ndarray, forests: Mapping[str, Forest]) -> ScreenedClou
     """Screen a cloud (N, 3) with the forests "leaf" and "screen"."""
     index = smoothed(build_index(np.ascontiguousarray(xyz)))
     stretch = scan_line_stretch(index)
-    return ScreenedCloud(index, screen(index, cloud_statistics(index, stretch), stretch, forests))
+    return ScreenedCloud(index, screen(index, cloud_statistics(index, stretch), forests, stretch))
 
 
 def add_context(
