@@ -12,7 +12,8 @@ from edgel._kernels.parallel import kernel
 from edgel._neighbors.kdtree import NeighborIndex
 from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.normals import OUTWARD, OWN, SENSOR, UNKNOWN, Normals, fit_planes, no_planes
-from edgel._neighbors.queries import every_place
+from edgel._neighbors.queries import Queries, at_places
+from edgel._neighbors.scan_lines import scan_line_stretch
 from edgel._objects import NORMALS
 from edgel.cloud import Cloud
 
@@ -66,11 +67,12 @@ def outward_normals(index: NeighborIndex) -> np.ndarray:
     between them: one pair that errs decides nothing. Last, the outermost points of each piece look outwards.
     """
     order, count = index.order, len(index)
-    planes = _steady_planes(index)
+    queries = at_places(index, np.arange(count), stretch=scan_line_stretch(index))
+    planes = _steady_planes(index, queries)
     xyz, normals = np.ascontiguousarray(index.xyz.T), planes.normals
     near, agreement = np.empty((count, SECTORS), np.int64), np.empty((count, SECTORS))
     k = min(NEIGHBORS, count)
-    visit_neighbors(_agree, every_place(index), index, k, normals, planes.offset, near, agreement)
+    visit_neighbors(_agree, queries, index, k, normals, planes.offset, near, agreement)
     reach = np.linalg.norm(xyz[near] - xyz[:, None], axis=2).mean(axis=1)
     sign, piece = _join(np.repeat(np.arange(count), near.shape[1]), near.ravel(), agreement.ravel())
     sure = (agreement * sign[:, None] * sign[near]).mean(axis=1) - (reach > SPARSE * np.median(reach))
@@ -80,12 +82,12 @@ def outward_normals(index: NeighborIndex) -> np.ndarray:
     return outward
 
 
-def _steady_planes(index: NeighborIndex) -> Normals:
+def _steady_planes(index: NeighborIndex, queries: Queries) -> Normals:
     """Fit a plane at each place to as many neighbours as lie on it no less well than fewer do.
 
     Few keep to one face of a blade or a plate, many average noise away.
     """
-    queries, planes, spread = every_place(index), no_planes(len(index)), np.full(len(index), np.inf)
+    planes, spread = no_planes(len(index)), np.full(len(index), np.inf)
     going_on = np.ones(len(index), bool)
     for k in COUNTS:
         if k > len(index) and k > COUNTS[0]:
