@@ -12,8 +12,8 @@ from edgel._kernels.parallel import kernel
 from edgel._neighbors.kdtree import NeighborIndex
 from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.normals import OUTWARD, OWN, SENSOR, UNKNOWN, Normals, fit_planes, no_planes
-from edgel._neighbors.queries import Queries, at_places
-from edgel._neighbors.scan_lines import scan_line_stretch
+from edgel._neighbors.queries import Queries, every_place
+from edgel._neighbors.scan_lines import scan_line_normals, scan_line_stretch
 from edgel._objects import NORMALS
 from edgel.cloud import Cloud
 
@@ -67,8 +67,11 @@ def outward_normals(index: NeighborIndex) -> np.ndarray:
     between them: one pair that errs decides nothing. Last, the outermost points of each piece look outwards.
     """
     order, count = index.order, len(index)
-    queries = at_places(index, np.arange(count), stretch=scan_line_stretch(index))
+    stretch = scan_line_stretch(index)
+    queries = every_place(index, stretch)
     planes = _steady_planes(index, queries)
+    if stretch is not None:
+        _put_lines(planes, index)
     xyz, normals = np.ascontiguousarray(index.xyz.T), planes.normals
     near, agreement = np.empty((count, SECTORS), np.int64), np.empty((count, SECTORS))
     k = min(NEIGHBORS, count)
@@ -99,6 +102,14 @@ def _steady_planes(index: NeighborIndex, queries: Queries) -> Normals:
         planes.put(rows, more.take(rows))
         spread = now
     return planes
+
+
+def _put_lines(planes: Normals, index: NeighborIndex) -> None:
+    """Put in the planes through scan lines, where they are known: they keep to one side of the thinnest plate."""
+    normals = scan_line_normals(index, np.arange(len(index)))
+    known = np.isfinite(normals[:, 0])
+    planes.normals[known] = normals[known]
+    planes.offset[known] = (normals * index.xyz.T).sum(axis=1)[known]
 
 
 @kernel

@@ -72,9 +72,10 @@ def every_point(index: NeighborIndex) -> Queries:
     return Queries(index.xyz, index.order)
 
 
-def every_place(index: NeighborIndex) -> Queries:
-    """Ask at every point of an index; the results are in the order of the places."""
-    return Queries(index.xyz, np.arange(len(index)))
+def every_place(index: NeighborIndex, stretch: np.ndarray | None = None) -> Queries:
+    """Ask at every point of an index, with its stretch (3, N) where there is one; the results are in places' order."""
+    xyz = index.xyz if stretch is None else np.concatenate([index.xyz, stretch])
+    return Queries(xyz, np.arange(len(index)))
 
 
 def at_places(

@@ -25,15 +25,15 @@ AREA = 64  # neighbours whose disc tells how much area a point stands for: lines
 LEAST, MOST = 2.5, 32.0  # distance of lines over that of the points on them
 FULL = 0.5
 ABREAST = 24  # neighbours, stretched by the most, among which the lines on either side are looked for
-_OPPOSITE = -0.85  # cosine between the ways to them, at most
+_OPPOSITE = -0.93  # cosine between the ways to them, at most
 _OWN = (1.5, 3.0)  # distances of points, and deviations from the line, within which a point is on it
 _ON_LINES = 1 / 12  # share of the neighbours that have to lie on lines: chance seldom does that
 _CLOUD = 0.2  # share of a cloud's points that have to, or it has no lines
 _SAMPLE = 4_000  # points that tell whether it has
 _EVEN = 0.2  # of the most spread there may be on a line: below it one stretch is as straight as the other
-_U, _SPREAD, _RATIO, _OFF, _APART, _REACH, _LINE = 0, 3, 4, 5, 6, 7, 8
+_U, _SPREAD, _RATIO, _OFF, _APART, _REACH, _ACROSS, _LINE = 0, 3, 4, 5, 6, 7, 8, 11
 """Columns of a line: direction, spread over its most, distance of lines over that of points, deviation of these from it,
-their distance, and how far away anything matters."""
+their distance, how far away anything matters, and the way from the line on one side to that on the other, or 0."""
 
 
 def scan_line_stretch(index: NeighborIndex) -> np.ndarray | None:
@@ -47,6 +47,19 @@ def scan_line_stretch(index: NeighborIndex) -> np.ndarray | None:
     lines, stretch = _lines(index, np.arange(len(index))), np.zeros((3, len(index)))
     visit_neighbors(_choose, every_place(index), index, AROUND, lines, stretch, np.empty(0))
     return stretch if stretch.any() else None
+
+
+def scan_line_normals(index: NeighborIndex, places: np.ndarray) -> np.ndarray:
+    """Return the normals (M, 3) of the surface through the lines at some places (M,), ascending, and those beside them.
+
+    NaN where no straight line or none on one side is known. Of a plate thinner than the distance of the lines no plane
+    fit knows them, since the nearest lines are those of its other side.
+    """
+    lines = _lines(index, places)
+    normals = np.cross(lines[:, :_SPREAD], lines[:, _ACROSS:])
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    length[lines[:, _SPREAD] >= 1.0] = 0.0
+    return normals / np.where(length > 0.0, length, np.nan)
 
 
 def stretch_reach(index: NeighborIndex) -> np.ndarray:
@@ -68,7 +81,7 @@ def _has_lines(index: NeighborIndex) -> bool:
 
 
 def _lines(index: NeighborIndex, places: np.ndarray) -> np.ndarray:
-    """Fit a line at some places (M,), ascending: (M, 8) float64."""
+    """Fit a line at some places (M,), ascending: (M, 11) float64."""
     lines = np.empty((len(places), _LINE))
     visit_neighbors(_fit_lines, at_places(index, places), index, AREA, np.array(STRAIGHT), lines)
     on = np.flatnonzero(lines[:, _SPREAD] < 1.0)
@@ -116,7 +129,7 @@ def _look_abreast(first, places, squared, queries, targets, xyz, lines):
     for q in range(places.shape[0]):
         line = lines[targets[first + q]]
         line[_REACH] = max(line[_REACH], math.sqrt(squared[q, k - 1]))
-        own, count, least = max(_OWN[0] * line[_APART], _OWN[1] * line[_OFF]), 0, np.inf
+        own, count, least, a, b = max(_OWN[0] * line[_APART], _OWN[1] * line[_OFF]), 0, np.inf, 0, 0
         for i in range(1, k):
             along, length = 0.0, 0.0
             for axis in range(3):
@@ -130,10 +143,12 @@ def _look_abreast(first, places, squared, queries, targets, xyz, lines):
         for i in range(count):
             for j in range(i):
                 dot = across[0, i] * across[0, j] + across[1, i] * across[1, j] + across[2, i] * across[2, j]
-                if dot < _OPPOSITE * across[3, i] * across[3, j]:
-                    least = min(least, across[3, i] + across[3, j])
+                if dot < _OPPOSITE * across[3, i] * across[3, j] and across[3, i] + across[3, j] < least:
+                    least, a, b = across[3, i] + across[3, j], i, j
         if least < np.inf:
             line[_RATIO] = 0.5 * least / line[_APART]
+            for axis in range(3):
+                line[_ACROSS + axis] = across[axis, a] - across[axis, b]
 
 
 @kernel

@@ -7,7 +7,7 @@ import numpy as np
 from edgel._kernels.parallel import kernel
 from edgel._neighbors.kdtree import NeighborIndex
 from edgel._neighbors.knn import visit_neighbors
-from edgel._neighbors.queries import at_places
+from edgel._neighbors.queries import every_place
 from edgel._neighbors.scan_lines import stretch_reach
 from edgel._surface.context import NEIGHBORS
 from edgel._surface.plane_scales import SCALES
@@ -24,7 +24,7 @@ def evidence_reach(index: NeighborIndex, stretch: np.ndarray | None = None) -> n
     """
     counts = np.minimum([SCALES[-1], FITS[-1][0], NEIGHBORS + 1], len(index))
     radii = np.empty((3, len(index)))
-    asked = at_places(index, np.arange(len(index)), stretch=stretch)  # no point lies farther than it does stretched
+    asked = every_place(index, stretch)  # no point lies farther than it does stretched
     visit_neighbors(_radii, asked, index, counts.max(), counts, radii)
     if stretch is not None:
         radii = np.maximum(radii, stretch_reach(index))
