@@ -22,6 +22,8 @@ WORSE = 2.0  # times the spread off the plane of fewer neighbours: with more the
 ORIENTS = ("auto", OUTWARD)
 
 NEIGHBORS, SECTORS = 48, 8  # of the neighbours of a point, the nearest in each sector is compared with it
+_PARALLEL = 0.8  # cosine of two planes that may be both sides of a plate, whose lines lie farther apart than it is thick
+_STEP = (0.05, 0.6)  # share off the planes, squared, of the way between points on them that does not tell
 SPARSE = 2.0  # times the median distance of neighbours: points that lie farther apart may be stray
 _DIRECTIONS = np.array(
     [np.array(d) / np.linalg.norm(d) for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)]
@@ -120,6 +122,7 @@ def _agree(first, places, squared, queries, targets, xyz, normals, offset, near,
     surface has both, since that mirrors one face of a crease onto the other, as it does two points of an arc. Points
     are laid onto their planes first, or noise would tilt what lies between near ones.
     """
+    stretched = queries.shape[0] > 3
     for q in range(places.shape[0]):
         p = targets[first + q]
         near[p], agreement[p] = p, 0.0
@@ -142,7 +145,10 @@ def _agree(first, places, squared, queries, targets, xyz, normals, offset, near,
             apart = x * x + y * y + z * z
             cosine = nx * mx + ny * my + nz * mz
             if apart > 0.0:
-                cosine -= 2.0 * (x * nx + y * ny + z * nz) * (x * mx + y * my + z * mz) / apart
+                off = (x * nx + y * ny + z * nz) * (x * mx + y * my + z * mz) / apart
+                if stretched and abs(cosine) > _PARALLEL and _STEP[0] < abs(off) < _STEP[1]:
+                    continue
+                cosine -= 2.0 * off
             if np.isfinite(cosine):
                 near[p, sector], agreement[p, sector] = j, cosine
                 left -= 1
