@@ -22,7 +22,9 @@ WORSE = 2.0  # times the spread off the plane of fewer neighbours: with more the
 ORIENTS = ("auto", OUTWARD)
 
 NEIGHBORS, SECTORS = 48, 8  # of the neighbours of a point, the nearest in each sector is compared with it
-_PARALLEL = 0.8  # cosine of two planes that may be both sides of a plate, whose lines lie farther apart than it is thick
+_PARALLEL = (
+    0.8  # cosine of two planes that may be both sides of a plate, whose lines lie farther apart than it is thick
+)
 _STEP = (0.05, 0.6)  # share off the planes, squared, of the way between points on them that does not tell
 SPARSE = 2.0  # times the median distance of neighbours: points that lie farther apart may be stray
 _DIRECTIONS = np.array(

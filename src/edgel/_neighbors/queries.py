@@ -92,13 +92,16 @@ def at_places(
     return Queries(xyz, np.arange(len(places)) if targets is None else targets)
 
 
-def at_points(index: NeighborIndex, points: np.ndarray) -> Queries:
-    """Ask at some points (M,) of an index, each once; the results are in their order."""
+def at_points(index: NeighborIndex, points: np.ndarray, stretch: np.ndarray | None = None) -> Queries:
+    """Ask at some points (M,) of an index, each once; the results are in their order.
+
+    Takes the stretch (3, N) at every place, where there is one.
+    """
     number = np.full(len(index), -1)
     number[points] = np.arange(len(points))
     targets = number[index.order]
     places = np.flatnonzero(targets >= 0)
-    return at_places(index, places, targets[places])
+    return at_places(index, places, targets[places], stretch)
 
 
 def anywhere(xyz: np.ndarray) -> Queries:

@@ -75,7 +75,11 @@ def _nearest(tree, point, stretch, stack, reaches, places, squared):
 @kernel
 def _least(box, qx, qy, qz, ux, uy, uz, more):
     """Bound the squared stretched distance of a box from below: the least distance, and the least along the stretch."""
-    dx, dy, dz = max(box[0] - qx, qx - box[3], 0.0), max(box[1] - qy, qy - box[4], 0.0), max(box[2] - qz, qz - box[5], 0.0)
+    dx, dy, dz = (
+        max(box[0] - qx, qx - box[3], 0.0),
+        max(box[1] - qy, qy - box[4], 0.0),
+        max(box[2] - qz, qz - box[5], 0.0),
+    )
     mx, my, mz = 0.5 * (box[0] + box[3]) - qx, 0.5 * (box[1] + box[4]) - qy, 0.5 * (box[2] + box[5]) - qz
     wide = abs(ux) * (box[3] - box[0]) + abs(uy) * (box[4] - box[1]) + abs(uz) * (box[5] - box[2])
     along = max(abs(mx * ux + my * uy + mz * uz) - 0.5 * wide, 0.0)

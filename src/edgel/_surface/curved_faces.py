@@ -58,10 +58,12 @@ def fit_curved_faces(first, places, squared, queries, targets, xyz, fits, max_aw
     scratch = make_scratch()
     for q in range(places.shape[0]):
         best, spacing = edges[targets[first + q]], disc_spacing(squared[q])
+        if queries.shape[0] > 3:  # chosen in a stretched space, but fitted as they lie
+            spacing /= math.sqrt(1.0 + math.sqrt((queries[3:, first + q] ** 2).sum()))
         if not spacing > 0.0:
             outside(fits[targets[first + q]], 1.0, best)
             continue
-        relative(places[q], queries, first + q, xyz, vectors)
+        relative(places[q], queries[:3], first + q, xyz, vectors)
         vectors /= spacing
         outside(fits[targets[first + q]], spacing, start)
         best[:] = start

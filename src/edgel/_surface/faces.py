@@ -25,6 +25,7 @@ def localize(
     ends: np.ndarray,
     outermost: np.ndarray,
     viewpoint: np.ndarray | None,
+    stretch: np.ndarray | None,
 ) -> Faces:
     """Say where exactly the edge runs at each edge point, and how the surface lies on either side.
 
@@ -46,6 +47,8 @@ def localize(
         The points that surely are where it ends, whatever edge points are asked for.
     viewpoint : (3,) float64 or None
         Normals are turned towards it, or upwards (+Z) without one.
+    stretch : (3, N) float64 or None
+        Of each place of `smoothed` on scan lines: see `edgel._neighbors.scan_lines`.
 
     Returns
     -------
@@ -55,19 +58,21 @@ def localize(
     faces = Faces.of_points(index.at(index.places_of(edge)), planes.normals)
     noise = np.sqrt(planes.residual / max(num_neighbors - 3, 1))
     _put_rims(faces, index, edge, planes, noise, ends, outermost)
-    found = crease_faces(refined(smoothed, creases), smoothed.at(smoothed.places_of(creases.points)), viewpoint)
+    found = crease_faces(
+        refined(smoothed, creases, stretch), smoothed.at(smoothed.places_of(creases.points)), viewpoint
+    )
     known = creases.evidence.placed & (found.convex != 0)
     faces.put(np.searchsorted(edge, creases.points[known]), found, known)
     return faces
 
 
-def refined(index: NeighborIndex, creases: Classification) -> np.ndarray:
+def refined(index: NeighborIndex, creases: Classification, stretch: np.ndarray | None = None) -> np.ndarray:
     """Fit curved faces to the neighbours of creases, from their best fit of two planes: see `fit_curved_faces`."""
     edges = np.empty((len(creases.points), EDGE))
     if len(edges):
         k = min(COUNTS[-1], len(index))
         arguments = (creases.evidence.fit.astype(np.float64), MAX_AWAY, MIN_TURN, edges)
-        visit_neighbors(fit_curved_faces, at_points(index, creases.points), index, k, *arguments)
+        visit_neighbors(fit_curved_faces, at_points(index, creases.points, stretch), index, k, *arguments)
     return edges
 
 

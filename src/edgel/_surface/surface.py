@@ -50,11 +50,17 @@ class Surface:
             return smoothed(index)
 
     @cached_property
-    def screening(self) -> Screening:
-        """Where an edge could be."""
+    def stretch(self) -> np.ndarray | None:
+        """What makes neighbourhoods on scan lines round, (3, N) by place of the smoothed tree; None without lines."""
         index = self.smoothed
         with self._stages("screening"):
-            stretch = scan_line_stretch(index)
+            return scan_line_stretch(index)
+
+    @cached_property
+    def screening(self) -> Screening:
+        """Where an edge could be."""
+        index, stretch = self.smoothed, self.stretch
+        with self._stages("screening"):
             return screen(index, cloud_statistics(index, stretch), stretch=stretch)
 
     @property
@@ -81,9 +87,22 @@ class Surface:
 
         Normals are turned towards the viewpoint, or upwards (+Z) without one.
         """
-        planes = fit_planes(self.index, at_points(self.index, edge), num_neighbors)
+        stretch = self.stretch
+        own = stretch if stretch is None else stretch[:, self.smoothed.places_of(self.index.order)]
+        planes = fit_planes(self.index, at_points(self.index, edge, own), num_neighbors)
         planes = towards(planes, self.xyz[edge], viewpoint)
         creases = self.classified.take(np.isin(self.classified.points, edge[(kind & EdgeKind.CREASE) > 0]))
         ends = (kind & OUTLINES) > 0
         outermost = self.classified.points[self.classified.outline > SURE]
-        return localize(self.index, self.smoothed, edge, planes, num_neighbors, creases, ends, outermost, viewpoint)
+        return localize(
+            self.index,
+            self.smoothed,
+            edge,
+            planes,
+            num_neighbors,
+            creases,
+            ends,
+            outermost,
+            viewpoint,
+            stretch,
+        )
