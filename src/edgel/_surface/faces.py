@@ -14,6 +14,8 @@ from edgel._surface.classify import Classification
 from edgel._surface.curved_faces import COUNTS, EDGE, FIRST, LINE, POSITION, SECOND, STD, fit_curved_faces
 from edgel._surface.evidence import MAX_AWAY, MIN_TURN
 
+ALIKE = 2.75  # deviations of edges between faces of smoothed points over what independent errors would leave: measured
+
 
 def localize(
     index: NeighborIndex,
@@ -59,20 +61,30 @@ def localize(
     noise = np.sqrt(planes.residual / max(num_neighbors - 3, 1))
     _put_rims(faces, index, edge, planes, noise, ends, outermost)
     found = crease_faces(
-        refined(smoothed, creases, stretch), smoothed.at(smoothed.places_of(creases.points)), viewpoint
+        refined(index, smoothed, creases, stretch), smoothed.at(smoothed.places_of(creases.points)), viewpoint
     )
     known = creases.evidence.placed & (found.convex != 0)
     faces.put(np.searchsorted(edge, creases.points[known]), found, known)
     return faces
 
 
-def refined(index: NeighborIndex, creases: Classification, stretch: np.ndarray | None = None) -> np.ndarray:
-    """Fit curved faces to the neighbours of creases, from their best fit of two planes: see `fit_curved_faces`."""
-    edges = np.empty((len(creases.points), EDGE))
+def refined(
+    index: NeighborIndex, smoothed: NeighborIndex, creases: Classification, stretch: np.ndarray | None = None
+) -> np.ndarray:
+    """Fit curved faces to the neighbours of creases, from their best fit of two planes: see `fit_curved_faces`.
+
+    Those of the cloud as it was measured: errors of smoothed neighbours are alike, so that fits are too sure. Where
+    these alone make an edge, its deviation is `ALIKE` times what its residuals say.
+    """
+    edges, again = np.empty((2, len(creases.points), EDGE))
     if len(edges):
-        k = min(COUNTS[-1], len(index))
-        arguments = (creases.evidence.fit.astype(np.float64), MAX_AWAY, MIN_TURN, edges)
-        visit_neighbors(fit_curved_faces, at_points(index, creases.points, stretch), index, k, *arguments)
+        k, asked = min(COUNTS[-1], len(index)), at_points(smoothed, creases.points, stretch)
+        fits = creases.evidence.fit.astype(np.float64)
+        visit_neighbors(fit_curved_faces, asked, index, k, fits, MAX_AWAY, MIN_TURN, edges)
+        if smoothed is not index:
+            visit_neighbors(fit_curved_faces, asked, smoothed, k, fits, MAX_AWAY, MIN_TURN, again)
+            again[:, STD] *= ALIKE
+            edges = np.where(np.isnan(edges[:, STD:]), again, edges)
     return edges
 
 
