@@ -74,6 +74,16 @@ def unstretch_direction(own, direction, at):
 
 
 @kernel
+def drop_foot(place, at, direction, begin):
+    """Move a place on a line along it to where it is nearest to the origin: another point of it in another space."""
+    along = 0.0
+    for axis in range(3):
+        along += place[at + axis] * direction[begin + axis]
+    for axis in range(3):
+        place[at + axis] -= along * direction[begin + axis]
+
+
+@kernel
 def _add_along(own, factor, vector, at):
     along = factor * (vector[at] * own[0] + vector[at + 1] * own[1] + vector[at + 2] * own[2])
     for axis in range(3):

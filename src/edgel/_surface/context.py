@@ -13,7 +13,7 @@ import numpy as np
 from edgel._kernels.eigen import smallest_eigenpair
 from edgel._kernels.parallel import kernel
 from edgel._neighbors.spacing import disc_spacing
-from edgel._neighbors.neighborhood import relative, stretch, stretch_direction
+from edgel._neighbors.neighborhood import drop_foot, relative, stretch, stretch_direction
 
 NEIGHBORS = 24
 
@@ -70,6 +70,7 @@ def gather_context(first, places, squared, queries, targets, xyz, probabilities,
                 if queries.shape[0] > 3:
                     stretch_direction(queries[3:, first + q], near_lines[i], 0)
                     stretch(queries[3:, first + q], near_feet[i], 0)
+                    drop_foot(near_feet[i], 0, near_lines[i], 0)
         for kind in range(2):
             _describe(
                 places[q],

@@ -11,7 +11,7 @@ from edgel._kernels.moments import add_moments_of_eight, planes_of_moments
 from edgel._kernels.parallel import kernel
 from edgel._kernels.rows import keep_rows, load_row, load_three, store_row, store_rows
 from edgel._kernels.simd import LANES, bits, root, spread, where
-from edgel._neighbors.neighborhood import unstretch, unstretch_direction, unstretch_normal
+from edgel._neighbors.neighborhood import drop_foot, unstretch, unstretch_direction, unstretch_normal
 
 ROUNDS = 3
 
@@ -99,11 +99,7 @@ def unstretch_hinge(own, fit):
     for place in (FOOT, FIRST_CENTROID, SECOND_CENTROID):
         unstretch(own, fit, place)
     unstretch_direction(own, fit, LINE)
-    along = 0.0
-    for axis in range(3):
-        along += fit[FOOT + axis] * fit[LINE + axis]
-    for axis in range(3):  # what was nearest to the point there is not so here
-        fit[FOOT + axis] -= along * fit[LINE + axis]
+    drop_foot(fit, FOOT, fit, LINE)
     length = unstretch_normal(own, fit, PARTING)
     if length > 0.0:
         fit[PARTING_LEVEL] /= length
