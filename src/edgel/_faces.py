@@ -51,7 +51,7 @@ class Faces:
             convex=np.zeros(len(xyz), np.int8),
         )
 
-    def put(self, rows: np.ndarray, other: Faces, which: np.ndarray) -> None:
+    def put(self, rows: np.ndarray, other: Faces, which: np.ndarray | slice) -> None:
         """Overwrite some rows (K,) with rows `which` (K,) of other faces."""
         for name in Faces.__dataclass_fields__:
             getattr(self, name)[rows] = getattr(other, name)[which]

@@ -13,7 +13,7 @@ from edgel._neighbors.queries import anywhere
 from edgel._neighbors.thinning import number_voxels
 from edgel._surface.line import Strengths
 
-CELL = 2.0  # spacings of the cloud: side of a cell
+CELL = 1.6  # spacings of the cloud: side of a cell
 FEWEST = 100  # cells that make a surface
 LIKELY = 0.5  # strength of what keeps the coarser look away
 FAINT = 0.25  # least strength, in the coarser look, of what is carried back

@@ -64,7 +64,7 @@ def gather_evidence(index: NeighborIndex, screening: Screening, places: np.ndarr
     if len(places):
         visit_neighbors(
             gather.gather_evidence,
-            at_places(index, places),
+            at_places(index, places, stretch=screening.stretch),
             index,
             min(FITS[-1][0], len(index)),
             screening.normals,
@@ -109,7 +109,12 @@ def support(evidence: Evidence) -> np.ndarray:
 
 
 def with_context(
-    index: NeighborIndex, places: np.ndarray, evidence: Evidence, crease: np.ndarray, outline: np.ndarray
+    index: NeighborIndex,
+    places: np.ndarray,
+    evidence: Evidence,
+    crease: np.ndarray,
+    outline: np.ndarray,
+    stretch: np.ndarray | None = None,
 ) -> np.ndarray:
     """Add to the evidence of some points how likely their neighbours are edge points.
 
@@ -121,6 +126,8 @@ def with_context(
     evidence : Evidence
     crease, outline : (M,) float64
         Probabilities by the evidence alone; at all other points they are 0.
+    stretch : (3, N) float64 or None
+        Of each place on scan lines: see `edgel._neighbors.scan_lines`.
 
     Returns
     -------
@@ -136,5 +143,6 @@ def with_context(
     if len(places):
         k = min(context.NEIGHBORS + 1, len(index))
         arguments = (probability, slot, lines, feet, around)
-        visit_neighbors(context.gather_context, at_places(index, places), index, k, *arguments)
+        asked = at_places(index, places, stretch=stretch)
+        visit_neighbors(context.gather_context, asked, index, k, *arguments)
     return np.concatenate([evidence.features, *around], axis=1)

@@ -32,11 +32,14 @@ class Screening:
         Of an edge, by the cheap evidence.
     statistics : (8,) float32
         Of the cloud: see `edgel._surface.statistics`.
+    stretch : (3, N) float64 or None
+        Of each place on scan lines: see `edgel._neighbors.scan_lines`.
     """
 
     normals: np.ndarray
     probability: np.ndarray
     statistics: np.ndarray
+    stretch: np.ndarray | None = None
 
     @property
     def candidates(self) -> np.ndarray:
@@ -51,10 +54,15 @@ class Screening:
         return normals
 
 
-def screen(index: NeighborIndex, statistics: np.ndarray, forests: Mapping[str, Forest] | None = None) -> Screening:
+def screen(
+    index: NeighborIndex,
+    statistics: np.ndarray,
+    forests: Mapping[str, Forest] | None = None,
+    stretch: np.ndarray | None = None,
+) -> Screening:
     """Gather the cheap evidence of every point that the leaves of the index do not rule out.
 
-    Takes the forests "leaf" and "screen", by default those of the package.
+    Takes the forests "leaf" and "screen", by default those of the package, and the stretch (3, N) on scan lines.
     """
     trees = load_forests() if forests is None else forests
     leaves = describe_leaves(index)
@@ -63,11 +71,13 @@ def screen(index: NeighborIndex, statistics: np.ndarray, forests: Mapping[str, F
     # Leaves around a likely one are kept too: how the tree cuts the cloud, which turns with it, must not matter.
     size = np.diff(leaf_starts(index))
     kept = np.repeat(likely[leaves.nearest].any(axis=1), size)
+    if stretch is not None:  # leaves hold points of one line, which say nothing of the surface
+        kept |= stretch.any(axis=0)
     normals = np.repeat(leaves.planes[:, None].astype(np.float32), len(SCALES), axis=1).repeat(size, axis=0)
     probability = np.zeros(len(index), np.float32)
     places = np.flatnonzero(kept)
     if len(places):
         k = min(SCALES[-1], len(index))
         arguments = (np.array(SCALES), statistics, trees["screen"].in_step, normals, probability)
-        visit_neighbors(gather.screen, at_places(index, places, places), index, k, *arguments)
-    return Screening(normals, probability, statistics)
+        visit_neighbors(gather.screen, at_places(index, places, places, stretch), index, k, *arguments)
+    return Screening(normals, probability, statistics, stretch)

@@ -7,11 +7,11 @@ import numpy as np
 from edgel._kernels.parallel import kernel
 from edgel._neighbors.kdtree import NeighborIndex, build_index
 from edgel._neighbors.knn import knn, visit_neighbors
+from edgel._neighbors.neighborhood import relative
 from edgel._neighbors.normals import fit_planes
 from edgel._neighbors.queries import at_places, every_point
 from edgel._neighbors.spacing import disc_spacing
 from edgel._surface import plane_scales
-from edgel._surface.neighborhood import relative
 from edgel._surface.plane_scales import SCALES, fit_scales
 
 NEIGHBORS = 24  # of the plane that a point is moved onto, the point among them

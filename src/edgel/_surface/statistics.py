@@ -28,8 +28,10 @@ _LARGEST = len(OF_SCALE) * (len(SCALES) - 1)  # first column of the largest scal
 _NEAREST = len(OF_SCALE) * len(SCALES)
 
 
-def cloud_statistics(index: NeighborIndex) -> np.ndarray:
+def cloud_statistics(index: NeighborIndex, stretch: np.ndarray | None = None) -> np.ndarray:
     """Take quantiles of the cheap evidence over a cloud, at places chosen by their coordinates alone.
+
+    Takes the stretch (3, N) of `edgel._neighbors.scan_lines`, where there is one.
 
     Returns
     -------
@@ -41,7 +43,7 @@ def cloud_statistics(index: NeighborIndex) -> np.ndarray:
     ValueError
         If no neighbourhood spans a plane.
     """
-    features = describe_places(index, index.sampled(_SAMPLE))
+    features = describe_places(index, index.sampled(_SAMPLE), stretch)
     if not (features[:, _LARGEST + ROUNDNESS] > _SPANS).any():
         raise ValueError("points: all lie on one line or spot, so there is no surface whose edges could be found")
     bent, noise, nearest, roundness = (features[:, i] for i in (_LARGEST + VARIATION, VARIATION, _NEAREST, ROUNDNESS))
@@ -54,9 +56,12 @@ def cloud_statistics(index: NeighborIndex) -> np.ndarray:
     return (np.round(np.concatenate(quantiles) / STEPS) * STEPS).astype(np.float32)
 
 
-def describe_places(index: NeighborIndex, places: np.ndarray) -> np.ndarray:
-    """Return the cheap evidence (M, `plane_scales.NUM_FEATURES`) float32 at some places (M,)."""
+def describe_places(index: NeighborIndex, places: np.ndarray, stretch: np.ndarray | None = None) -> np.ndarray:
+    """Return the cheap evidence (M, `plane_scales.NUM_FEATURES`) float32 at some places (M,), ascending.
+
+    Takes the stretch (3, N) of `edgel._neighbors.scan_lines`, where there is one.
+    """
     features = np.zeros((len(places), plane_scales.NUM_FEATURES), np.float32)
     k = min(SCALES[-1], len(index))
-    visit_neighbors(describe, at_places(index, places), index, k, np.array(SCALES), features)
+    visit_neighbors(describe, at_places(index, places, stretch=stretch), index, k, np.array(SCALES), features)
     return features

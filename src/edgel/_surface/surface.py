@@ -10,6 +10,7 @@ from edgel._faces import Faces
 from edgel._neighbors.kdtree import NeighborIndex, build_index
 from edgel._neighbors.normals import fit_planes, towards
 from edgel._neighbors.queries import at_points
+from edgel._neighbors.scan_lines import scan_line_stretch
 from edgel._stages import Stages
 from edgel._surface.classify import Classification, classify
 from edgel._surface.coarser import CELL, FAINT, FEWEST, Carried, apart, carry, means_of_cells
@@ -53,11 +54,18 @@ class Surface:
             return smoothed(index)
 
     @cached_property
-    def screening(self) -> Screening:
-        """Where an edge could be."""
+    def stretch(self) -> np.ndarray | None:
+        """What makes neighbourhoods on scan lines round, (3, N) by place of the smoothed tree; None without lines."""
         index = self.smoothed
         with self._stages("screening"):
-            return screen(index, cloud_statistics(index))
+            return scan_line_stretch(index)
+
+    @cached_property
+    def screening(self) -> Screening:
+        """Where an edge could be."""
+        index, stretch = self.smoothed, self.stretch
+        with self._stages("screening"):
+            return screen(index, cloud_statistics(index, stretch), stretch=stretch)
 
     @property
     def normals(self) -> np.ndarray:
@@ -114,17 +122,35 @@ class Surface:
 
         Normals are turned towards the viewpoint, or upwards (+Z) without one.
         """
-        planes = fit_planes(self.index, at_points(self.index, edge), num_neighbors)
+        stretch = self.stretch
+        own = stretch if stretch is None else stretch[:, self.smoothed.places_of(self.index.order)]
+        planes = fit_planes(self.index, at_points(self.index, edge, own), num_neighbors)
         planes = towards(planes, self.xyz[edge], viewpoint)
         creases = self.classified.take(np.isin(self.classified.points, edge[(kind & EdgeKind.CREASE) > 0]))
         ends = (kind & OUTLINES) > 0
         outermost = self.classified.points[self.classified.outline > SURE]
-        faces = localize(self.index, self.smoothed, edge, planes, num_neighbors, creases, ends, outermost, viewpoint)
-        if self._carried is not None:
-            rows, sources = self._carried.seen_at(edge, self._own_strengths)
-            asked, of_source = np.unique(sources, return_inverse=True)
-            strengths = self._coarser.strengths
-            kinds = strengths.take(np.searchsorted(strengths.points, asked)).kinds(FAINT)
-            found = self._coarser.faces(asked, kinds, num_neighbors, viewpoint)
-            faces.put(rows, found.along(self.xyz[edge[rows]], of_source), slice(None))
+        faces = localize(
+            self.index,
+            self.smoothed,
+            edge,
+            planes,
+            num_neighbors,
+            creases,
+            ends,
+            outermost,
+            viewpoint,
+            stretch,
+        )
+        self._put_carried(faces, edge, num_neighbors, viewpoint)
         return faces
+
+    def _put_carried(self, faces: Faces, edge: np.ndarray, num_neighbors: int, viewpoint: np.ndarray | None) -> None:
+        """Put what the coarser look says of the edge points that it alone shows."""
+        coarser, carried = self._coarser, self._carried
+        if coarser is None or carried is None:
+            return
+        rows, sources = carried.seen_at(edge, self._own_strengths)
+        asked, of_source = np.unique(sources, return_inverse=True)
+        kinds = coarser.strengths.take(np.searchsorted(coarser.strengths.points, asked)).kinds(FAINT)
+        found = coarser.faces(asked, kinds, num_neighbors, viewpoint)
+        faces.put(rows, found.along(self.xyz[edge[rows]], of_source), slice(None))
