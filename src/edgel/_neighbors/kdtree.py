@@ -170,13 +170,6 @@ def node_start(number, count, nodes):
     return min(number * ((count + LANES - 1) // LANES) // nodes * LANES, count)
 
 
-def leaf_starts(index: NeighborIndex) -> np.ndarray:
-    """Return the first place of each leaf, and the number of points after the last, (L + 1,) int64."""
-    leaves = len(index.boxes) // 2
-    blocks = (len(index) + LANES - 1) // LANES
-    return np.minimum(np.arange(leaves + 1) * blocks // leaves * LANES, len(index))
-
-
 @kernel
 def _extent(values, first, last):
     """Smallest and largest of values[first:last]."""

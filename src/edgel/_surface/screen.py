@@ -1,4 +1,4 @@
-"""Screening: where could an edge be? By the leaves of the k-d tree first, then by plane fits at three scales."""
+"""Screening: where could an edge be? By the leaves of an octree first, then by plane fits at three scales."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel._neighbors.kdtree import NeighborIndex, leaf_starts
+from edgel._neighbors.kdtree import NeighborIndex
 from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.queries import at_places
 from edgel._surface import gather
 from edgel._surface.forest import Forest, evaluate, load_forests
 from edgel._surface.leaves import describe_leaves
 from edgel._surface.plane_scales import SCALES
+from edgel._surface.statistics import Statistics
 
 LEAF = 0.05  # least probability of an edge in a leaf, or in one around it, for screening its points
 POINT = 0.04  # least probability of an edge at a point, by the cheap evidence, for gathering the costly one
@@ -26,17 +27,17 @@ class Screening:
     Attributes
     ----------
     normals : (N, S, 4) float32
-        Normal and planarity of the plane fitted at each of `SCALES`; where a leaf of the index was found smooth, that
-        of the leaf.
+        Normal and planarity of the plane fitted at each of `SCALES`; where a leaf of the octree was found smooth,
+        that of the leaf.
     probability : (N,) float32
         Of an edge, by the cheap evidence.
-    statistics : (8,) float32
-        Of the cloud: see `edgel._surface.statistics`.
+    statistics : Statistics
+        Of the cloud.
     """
 
     normals: np.ndarray
     probability: np.ndarray
-    statistics: np.ndarray
+    statistics: Statistics
 
     @property
     def candidates(self) -> np.ndarray:
@@ -51,23 +52,22 @@ class Screening:
         return normals
 
 
-def screen(index: NeighborIndex, statistics: np.ndarray, forests: Mapping[str, Forest] | None = None) -> Screening:
-    """Gather the cheap evidence of every point that the leaves of the index do not rule out.
+def screen(index: NeighborIndex, statistics: Statistics, forests: Mapping[str, Forest] | None = None) -> Screening:
+    """Gather the cheap evidence of every point that the leaves of an octree do not rule out.
 
     Takes the forests "leaf" and "screen", by default those of the package.
     """
     trees = load_forests() if forests is None else forests
-    leaves = describe_leaves(index)
-    of_cloud = np.broadcast_to(statistics, (len(leaves.features), len(statistics)))
-    likely = evaluate(trees["leaf"], np.concatenate([leaves.features, of_cloud], axis=1)) >= LEAF
-    # Leaves around a likely one are kept too: how the tree cuts the cloud, which turns with it, must not matter.
-    size = np.diff(leaf_starts(index))
-    kept = np.repeat(likely[leaves.nearest].any(axis=1), size)
-    normals = np.repeat(leaves.planes[:, None].astype(np.float32), len(SCALES), axis=1).repeat(size, axis=0)
+    leaves, of_cloud = describe_leaves(index, statistics.cell), statistics.features
+    repeated = np.broadcast_to(of_cloud, (len(leaves.features), len(of_cloud)))
+    likely = evaluate(trees["leaf"], np.concatenate([leaves.features, repeated], axis=1)) >= LEAF
+    # Leaves around a likely one are kept too: where cells begin must not matter.
+    leaf = leaves.octree.leaf_of_places()
+    normals = np.repeat(leaves.planes[:, None].astype(np.float32), len(SCALES), axis=1)[leaf]
     probability = np.zeros(len(index), np.float32)
-    places = np.flatnonzero(kept)
+    places = np.flatnonzero(likely[leaves.nearest].any(axis=1)[leaf])
     if len(places):
         k = min(SCALES[-1], len(index))
-        arguments = (np.array(SCALES), statistics, trees["screen"].in_step, normals, probability)
+        arguments = (np.array(SCALES), of_cloud, trees["screen"].in_step, normals, probability)
         visit_neighbors(gather.screen, at_places(index, places, places), index, k, *arguments)
     return Screening(normals, probability, statistics)

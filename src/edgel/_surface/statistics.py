@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from edgel._kernels.parallel import kernel
 from edgel._neighbors.kdtree import NeighborIndex
 from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.queries import at_places
+from edgel._neighbors.spacing import disc_spacing
 from edgel._surface import plane_scales
 from edgel._surface.plane_scales import OF_SCALE, ROUNDNESS, SCALES, VARIATION, describe
 
@@ -22,26 +26,41 @@ FEATURES = {
 }
 STEPS = np.array([2.0, 2.0, 1.0, 2.0, 2.0, 0.2, 0.1, 0.1])
 """What each is rounded to: no answer shall hang on which points were sampled, or on what lies far away."""
+CELL = 16.0
+"""Size of the cells that are looked at first, in median spacings."""
 _SAMPLE = 16_000  # points that the quantiles are taken of
 _SPANS = 1e-10  # roundness below which neighbours lie on a line
 _LARGEST = len(OF_SCALE) * (len(SCALES) - 1)  # first column of the largest scale
 _NEAREST = len(OF_SCALE) * len(SCALES)
 
 
-def cloud_statistics(index: NeighborIndex) -> np.ndarray:
-    """Take quantiles of the cheap evidence over a cloud, at places chosen by their coordinates alone.
+@dataclass(frozen=True, eq=False)
+class Statistics:
+    """What the whole cloud says.
 
-    Returns
-    -------
-    (8,) float32
+    Attributes
+    ----------
+    features : (8,) float32
         `FEATURES`, in whole `STEPS`.
+    cell : float
+        Size of the cells whose points are looked at together at first: a power of two, in the cloud's unit.
+    """
+
+    features: np.ndarray
+    cell: float
+
+
+def cloud_statistics(index: NeighborIndex) -> Statistics:
+    """Take quantiles of the cheap evidence over a cloud, at places chosen by their coordinates alone.
 
     Raises
     ------
     ValueError
         If no neighbourhood spans a plane.
     """
-    features = describe_places(index, index.sampled(_SAMPLE))
+    places = index.sampled(_SAMPLE)
+    features, spacing = describe_places(index, places), np.empty(len(places))
+    visit_neighbors(_spacings, at_places(index, places), index, min(SCALES[-1], len(index)), spacing)
     if not (features[:, _LARGEST + ROUNDNESS] > _SPANS).any():
         raise ValueError("points: all lie on one line or spot, so there is no surface whose edges could be found")
     bent, noise, nearest, roundness = (features[:, i] for i in (_LARGEST + VARIATION, VARIATION, _NEAREST, ROUNDNESS))
@@ -51,7 +70,9 @@ def cloud_statistics(index: NeighborIndex) -> np.ndarray:
         np.quantile(nearest, [0.1, 0.5]),
         np.quantile(roundness, [0.5]),
     ]
-    return (np.round(np.concatenate(quantiles) / STEPS) * STEPS).astype(np.float32)
+    values = (np.round(np.concatenate(quantiles) / STEPS) * STEPS).astype(np.float32)
+    cell = 2.0 ** np.round(np.log2(CELL * np.median(spacing[spacing > 0])))
+    return Statistics(values, float(cell))
 
 
 def describe_places(index: NeighborIndex, places: np.ndarray) -> np.ndarray:
@@ -60,3 +81,9 @@ def describe_places(index: NeighborIndex, places: np.ndarray) -> np.ndarray:
     k = min(SCALES[-1], len(index))
     visit_neighbors(describe, at_places(index, places), index, k, np.array(SCALES), features)
     return features
+
+
+@kernel
+def _spacings(first, places, squared, queries, targets, xyz, spacing):
+    for q in range(places.shape[0]):
+        spacing[targets[first + q]] = disc_spacing(squared[q])
