@@ -34,6 +34,7 @@ def houses():
 
 def test_what_is_out_of_reach_changes_nothing(houses):
     xyz = np.concatenate([houses, houses[::500] + [0.3, 0.2, 6.0]])  # some stray points
+    xyz[(xyz[:, 1] > 60) & (xyz[:, 2] < 15), 2] = 0.0  # and a field, which the first look rules out
     whole = build_index(xyz)
     statistics = cloud_statistics(whole)
     cut = 112 // statistics.cell * statistics.cell  # whole cells
