@@ -451,7 +451,7 @@ def back_project(depth, scale, fx, fy, cx, cy):
 
 
 def octree_leaves(points, size, most, fewest, levels):
-    """Sets of points (rows) that lie in the same leaf: cells of a fixed grid, cut into eight while they hold too many."""
+    """Sets of points (rows) that lie in the same leaf: cells of a grid, cut in eight while too full."""
 
     def cut(rows, size, level):
         if len(rows) <= most or level == levels:

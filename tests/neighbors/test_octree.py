@@ -40,7 +40,9 @@ def test_leaves_of_a_part_are_those_of_the_whole():
     xyz = surface(20_000) + [512_345.0, 5_401_234.5, 88.0]  # as in UTM
     size = 4.0
     part = np.flatnonzero((xyz[:, 0] >= 512_328.0) & (xyz[:, 0] < 512_352.0))  # whole cells
-    inside = {frozenset(np.searchsorted(part, list(leaf)).tolist()) for leaf in leaves_of(xyz, size) if leaf <= set(part)}
+    inside = {
+        frozenset(np.searchsorted(part, list(leaf)).tolist()) for leaf in leaves_of(xyz, size) if leaf <= set(part)
+    }
     assert 1_000 < len(part) < 19_000
     assert leaves_of(xyz[part], size) == inside
 

@@ -1,6 +1,5 @@
 """Evidence: each kernel against its slow oracle."""
 
-import itertools
 import math
 
 import naive

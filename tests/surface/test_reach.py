@@ -9,6 +9,7 @@ from edgel._surface import classify, cloud_statistics, screen
 from edgel._surface.leaves import describe_leaves
 from edgel._surface.reach import evidence_reach, screening_reach
 
+
 def probabilities(index, statistics):
     """Crease and outline by point, (N, 2); 0 where no one looked."""
     found = classify(index, screen(index, statistics))

@@ -16,7 +16,7 @@ from edgel._surface.leaves import describe_leaves
 from edgel._surface.plane_scales import SCALES
 from edgel._surface.statistics import Statistics
 
-LEAF = 0.05  # least probability of an edge in a leaf, or in one around it, for screening its points
+LEAF = 0.2  # leaves with an edge that are expected among those nearest to a leaf: least for screening its points
 POINT = 0.04  # least probability of an edge at a point, by the cheap evidence, for gathering the costly one
 
 
@@ -60,12 +60,13 @@ def screen(index: NeighborIndex, statistics: Statistics, forests: Mapping[str, F
     trees = load_forests() if forests is None else forests
     leaves, of_cloud = describe_leaves(index, statistics.cell), statistics.features
     repeated = np.broadcast_to(of_cloud, (len(leaves.features), len(of_cloud)))
-    likely = evaluate(trees["leaf"], np.concatenate([leaves.features, repeated], axis=1)) >= LEAF
-    # Leaves around a likely one are kept too: where cells begin must not matter.
+    probable = evaluate(trees["leaf"], np.concatenate([leaves.features, repeated], axis=1))
+    # Those around a likely one are kept too: where cells begin must not matter.
+    kept = probable[leaves.nearest].sum(axis=1) >= LEAF
     leaf = leaves.octree.leaf_of_places()
     normals = np.repeat(leaves.planes[:, None].astype(np.float32), len(SCALES), axis=1)[leaf]
     probability = np.zeros(len(index), np.float32)
-    places = np.flatnonzero(likely[leaves.nearest].any(axis=1)[leaf])
+    places = np.flatnonzero(kept[leaf])
     if len(places):
         k = min(SCALES[-1], len(index))
         arguments = (np.array(SCALES), of_cloud, trees["screen"].in_step, normals, probability)

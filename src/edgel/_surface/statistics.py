@@ -6,11 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel
 from edgel._neighbors.kdtree import NeighborIndex
 from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.queries import at_places
-from edgel._neighbors.spacing import disc_spacing
 from edgel._surface import plane_scales
 from edgel._surface.plane_scales import OF_SCALE, ROUNDNESS, SCALES, VARIATION, describe
 
@@ -59,8 +57,7 @@ def cloud_statistics(index: NeighborIndex) -> Statistics:
         If no neighbourhood spans a plane.
     """
     places = index.sampled(_SAMPLE)
-    features, spacing = describe_places(index, places), np.empty(len(places))
-    visit_neighbors(_spacings, at_places(index, places), index, min(SCALES[-1], len(index)), spacing)
+    features, spacing = describe_places(index, places)
     if not (features[:, _LARGEST + ROUNDNESS] > _SPANS).any():
         raise ValueError("points: all lie on one line or spot, so there is no surface whose edges could be found")
     bent, noise, nearest, roundness = (features[:, i] for i in (_LARGEST + VARIATION, VARIATION, _NEAREST, ROUNDNESS))
@@ -75,15 +72,9 @@ def cloud_statistics(index: NeighborIndex) -> Statistics:
     return Statistics(values, float(cell))
 
 
-def describe_places(index: NeighborIndex, places: np.ndarray) -> np.ndarray:
-    """Return the cheap evidence (M, `plane_scales.NUM_FEATURES`) float32 at some places (M,)."""
-    features = np.zeros((len(places), plane_scales.NUM_FEATURES), np.float32)
+def describe_places(index: NeighborIndex, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the cheap evidence (M, `plane_scales.NUM_FEATURES`) float32 at some places (M,), and the spacing (M,)."""
+    features, spacing = np.zeros((len(places), plane_scales.NUM_FEATURES), np.float32), np.empty(len(places))
     k = min(SCALES[-1], len(index))
-    visit_neighbors(describe, at_places(index, places), index, k, np.array(SCALES), features)
-    return features
-
-
-@kernel
-def _spacings(first, places, squared, queries, targets, xyz, spacing):
-    for q in range(places.shape[0]):
-        spacing[targets[first + q]] = disc_spacing(squared[q])
+    visit_neighbors(describe, at_places(index, places), index, k, np.array(SCALES), features, spacing)
+    return features, spacing

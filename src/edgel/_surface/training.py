@@ -48,7 +48,7 @@ def screening_features(xyz: np.ndarray, asked: np.ndarray) -> ScreeningFeatures:
     leaf[index.order] = found.octree.leaf_of_places()
     leaves, features = (
         np.concatenate([part, np.broadcast_to(values, (len(part), len(values)))], axis=1)
-        for part in (found.features, describe_places(index, places))
+        for part in (found.features, describe_places(index, places)[0])
     )
     return ScreeningFeatures(leaves, leaf, index.order[places], features)
 
