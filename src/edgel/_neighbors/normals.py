@@ -8,7 +8,8 @@ import numpy as np
 
 from edgel._kernels.parallel import run_slices
 from edgel._neighbors.kdtree import NeighborIndex
-from edgel._neighbors.plane_fits import fit_slice
+from edgel._neighbors.knn import visit_neighbors
+from edgel._neighbors.plane_fits import fit_slice, fit_sorted
 from edgel._neighbors.queries import Queries, tree_of
 
 SENSOR, OWN, OUTWARD, UNKNOWN = "sensor", "normals", "outward", "unknown"
@@ -85,6 +86,18 @@ def fit_planes(index: NeighborIndex, queries: Queries, num_neighbors: int) -> No
     All points are neighbours where there are fewer than `num_neighbors`.
     """
     return _fit(index, queries, min(num_neighbors, len(index)), np.empty(0))
+
+
+def fit_nearest(index: NeighborIndex, queries: Queries, num_neighbors: int) -> Normals:
+    """Fit planes as `fit_planes` does, with sums from the nearest neighbour to the farthest.
+
+    So they are the same to the bit in a part of the cloud that holds these neighbours, whose tree is another.
+    """
+    count = len(queries)
+    planes = Normals(np.empty((count, 3)), np.empty(count), np.empty(count), np.empty(count))
+    results = (planes.normals, planes.offset, planes.residual, planes.variation)
+    visit_neighbors(fit_sorted, queries, index, min(num_neighbors, len(index)), *results)
+    return planes
 
 
 def fit_planes_within(index: NeighborIndex, queries: Queries, num_neighbors: int) -> tuple[Normals, np.ndarray]:

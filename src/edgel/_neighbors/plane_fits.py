@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from edgel._kernels.eigen import smallest_eigenpairs
+from edgel._kernels.eigen import smallest_eigenpair, smallest_eigenpairs
 from edgel._kernels.moments import scatter
 from edgel._kernels.parallel import kernel, part
 from edgel._kernels.simd import LANES, larger, load, multiply_add, spread, store, where
@@ -81,3 +81,29 @@ def _fit_eight(tree, scratch, count, k, planes):
     store(planes, 3 * LANES, nx * (x + cx) + ny * (y + cy) + nz * (z + cz))
     store(planes, 4 * LANES, smallest * sign * sign)
     store(planes, 5 * LANES, smallest / trace * sign * sign)
+
+
+@kernel
+def fit_sorted(first, places, squared, queries, targets, xyz, normals, offset, residual, variation):
+    """Fit planes to neighbours that are sorted by their distance; writes what `fit_slice` does."""
+    for q in range(places.shape[0]):
+        row, k = targets[first + q], places.shape[1]
+        x, y, z = queries[0, first + q], queries[1, first + q], queries[2, first + q]
+        mx, my, mz = 0.0, 0.0, 0.0
+        xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for i in range(k):
+            p = places[q, i]
+            dx, dy, dz = xyz[0, p] - x, xyz[1, p] - y, xyz[2, p] - z
+            mx, my, mz = mx + dx, my + dy, mz + dz
+            xx, xy, xz, yy, yz, zz = xx + dx * dx, xy + dx * dy, xz + dx * dz, yy + dy * dy, yz + dy * dz, zz + dz * dz
+        cx, cy, cz = mx / k, my / k, mz / k
+        xx, xy, xz, yy, yz, zz = scatter(cx, cy, cz, mx, my, mz, xx, xy, xz, yy, yz, zz)
+        smallest, middle, nx, ny, nz = smallest_eigenpair(xx, xy, xz, yy, yz, zz)
+        trace = xx + yy + zz
+        down = nz < 0.0 or (nz == 0.0 and (ny < 0.0 or (ny == 0.0 and nx < 0.0)))
+        sign = np.nan if middle <= _FLAT * trace else -1.0 if down else 1.0
+        nx, ny, nz, smallest = nx * sign, ny * sign, nz * sign, max(smallest, 0.0)
+        normals[row, 0], normals[row, 1], normals[row, 2] = nx, ny, nz
+        offset[row] = nx * (x + cx) + ny * (y + cy) + nz * (z + cz)
+        residual[row] = smallest * sign * sign
+        variation[row] = smallest / trace * sign * sign

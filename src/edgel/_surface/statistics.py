@@ -26,7 +26,8 @@ STEPS = np.array([2.0, 2.0, 1.0, 2.0, 2.0, 0.2, 0.1, 0.1])
 """What each is rounded to: no answer shall hang on which points were sampled, or on what lies far away."""
 CELL = 16.0
 """Size of the cells that are looked at first, in median spacings."""
-_SAMPLE = 16_000  # points that the quantiles are taken of
+SAMPLE = 16_000
+"""Points that the quantiles are taken of."""
 _SPANS = 1e-10  # roundness below which neighbours lie on a line
 _LARGEST = len(OF_SCALE) * (len(SCALES) - 1)  # first column of the largest scale
 _NEAREST = len(OF_SCALE) * len(SCALES)
@@ -40,12 +41,17 @@ class Statistics:
     ----------
     features : (8,) float32
         `FEATURES`, in whole `STEPS`.
-    cell : float
-        Size of the cells whose points are looked at together at first: a power of two, in the cloud's unit.
+    spacing : float
+        Median root of the area that a point stands for, in the cloud's unit.
     """
 
     features: np.ndarray
-    cell: float
+    spacing: float
+
+    @property
+    def cell(self) -> float:
+        """Size of the cells whose points are looked at together at first: a power of two, in the cloud's unit."""
+        return float(2.0 ** np.round(np.log2(CELL * self.spacing)))
 
 
 def cloud_statistics(index: NeighborIndex) -> Statistics:
@@ -56,8 +62,17 @@ def cloud_statistics(index: NeighborIndex) -> Statistics:
     ValueError
         If no neighbourhood spans a plane.
     """
-    places = index.sampled(_SAMPLE)
-    features, spacing = describe_places(index, places)
+    return statistics_of(*describe_places(index, index.sampled(SAMPLE)))
+
+
+def statistics_of(features: np.ndarray, spacing: np.ndarray) -> Statistics:
+    """Take the quantiles of what `describe_places` says of the sampled places of a cloud, in any order.
+
+    Raises
+    ------
+    ValueError
+        If no neighbourhood spans a plane.
+    """
     if not (features[:, _LARGEST + ROUNDNESS] > _SPANS).any():
         raise ValueError("points: all lie on one line or spot, so there is no surface whose edges could be found")
     bent, noise, nearest, roundness = (features[:, i] for i in (_LARGEST + VARIATION, VARIATION, _NEAREST, ROUNDNESS))
@@ -68,8 +83,7 @@ def cloud_statistics(index: NeighborIndex) -> Statistics:
         np.quantile(roundness, [0.5]),
     ]
     values = (np.round(np.concatenate(quantiles) / STEPS) * STEPS).astype(np.float32)
-    cell = 2.0 ** np.round(np.log2(CELL * np.median(spacing[spacing > 0])))
-    return Statistics(values, float(cell))
+    return Statistics(values, float(np.median(spacing[spacing > 0])))
 
 
 def describe_places(index: NeighborIndex, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

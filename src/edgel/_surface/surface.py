@@ -8,7 +8,7 @@ import numpy as np
 
 from edgel._faces import Faces
 from edgel._neighbors.kdtree import NeighborIndex, build_index
-from edgel._neighbors.normals import fit_planes, towards
+from edgel._neighbors.normals import fit_nearest, towards
 from edgel._neighbors.queries import at_points
 from edgel._stages import Stages
 from edgel._surface.classify import Classification, classify
@@ -79,9 +79,9 @@ class Surface:
 
         Normals are turned towards the viewpoint, or upwards (+Z) without one.
         """
-        planes = fit_planes(self.index, at_points(self.index, edge), num_neighbors)
+        planes = fit_nearest(self.index, at_points(self.index, edge), num_neighbors)
         planes = towards(planes, self.xyz[edge], viewpoint)
         creases = self.classified.take(np.isin(self.classified.points, edge[(kind & EdgeKind.CREASE) > 0]))
         ends = (kind & OUTLINES) > 0
-        outermost = self.classified.points[self.classified.outline > SURE]
+        outermost = self.xyz[self.classified.points[self.classified.outline > SURE]]
         return localize(self.index, self.smoothed, edge, planes, num_neighbors, creases, ends, outermost, viewpoint)
