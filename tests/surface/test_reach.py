@@ -7,7 +7,7 @@ import edgel
 from edgel._neighbors.kdtree import build_index
 from edgel._surface import classify, cloud_statistics, screen
 from edgel._surface.leaves import describe_leaves
-from edgel._surface.reach import evidence_reach, screening_reach
+from edgel._surface.reach import evidence_reach, screening_reach, settled
 
 
 def probabilities(index, statistics):
@@ -44,9 +44,13 @@ def test_what_is_out_of_reach_changes_nothing(houses):
     expected, said = probabilities(whole, statistics)[xyz[:, 0] < cut], probabilities(part, statistics)
     leaves = describe_leaves(part, statistics.cell)
     reach, looked = np.empty((2, len(tile)))
-    for radii, result in ((evidence_reach(part, leaves), reach), (screening_reach(part, leaves), looked)):
+    everywhere = np.arange(len(part))
+    for radii, result in ((evidence_reach(part, leaves, everywhere), reach), (screening_reach(part, leaves), looked)):
         result[part.order] = radii
     sure = reach < cut - tile[:, 0]  # told by the tile alone
+    told = np.empty(len(tile), bool)
+    told[part.order] = settled(part, leaves, cut - part.xyz[0])
+    np.testing.assert_array_equal(told, sure)  # most of them by their leaves
     assert sure.mean() > 0.3
     assert np.median(reach) < 60
     np.testing.assert_array_equal(said[sure], expected[sure])
