@@ -47,8 +47,10 @@ def strengths(index: NeighborIndex, points: np.ndarray, probability: np.ndarray)
     if even >= SURE:
         return strength_of(probability, even)
     faint = faint_points(index, points, probability, even)
-    chained = np.empty(len(faint.rows), np.bool_)
-    keep_linked(faint.links, probability[faint.rows] >= STRONG, chained)
+    number, chained = np.full(len(probability), -1), np.empty(len(faint.rows), np.bool_)
+    number[faint.rows] = np.arange(len(faint.rows))
+    links = np.where(faint.links >= 0, number[faint.links], -1)
+    keep_linked(links, probability[faint.rows] >= STRONG, chained)
     return with_faint(probability, even, faint, chained)
 
 
@@ -80,7 +82,7 @@ class Faint:
     rows : (K,) int64
         Among the points with a probability, ascending.
     links : (K, 9) int64
-        The row, among these, of the nearest points of each, itself first; -1 where that is none of them.
+        The rows of the nearest points of each, itself first; -1 where that is not as likely.
     nearest : (K, 9) int64
         The nearest points.
     likeliest : (K,) bool
@@ -93,12 +95,18 @@ class Faint:
     likeliest: np.ndarray
 
 
-def faint_points(index: NeighborIndex, points: np.ndarray, probability: np.ndarray, even: float) -> Faint:
-    """Look at the nearest of those points (M,), ascending, whose probability (M,) is at least `even`."""
-    on = np.flatnonzero(probability >= even)
+def faint_points(
+    index: NeighborIndex, points: np.ndarray, probability: np.ndarray, even: float, own: np.ndarray | None = None
+) -> Faint:
+    """Look at the nearest of those points (M,), ascending, whose probability (M,) is at least `even`.
+
+    Only at those of some rows `own` (K,), ascending, where these are given.
+    """
+    likely = probability >= even
+    on = np.flatnonzero(likely) if own is None else own[likely[own]]
     nearest = knn(index, at_points(index, points[on]), min(NEAREST, len(index))).points
     everywhere, row = np.zeros(len(index)), np.full(len(index), -1)
-    everywhere[points], row[points[on]] = probability, np.arange(len(on))
+    everywhere[points], row[points[likely]] = probability, np.flatnonzero(likely)
     return Faint(on, row[nearest], nearest, probability[on] >= everywhere[nearest].max(axis=1))
 
 

@@ -12,7 +12,7 @@ from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.queries import at_places
 from edgel._surface import gather
 from edgel._surface.forest import Forest, evaluate, load_forests
-from edgel._surface.leaves import describe_leaves
+from edgel._surface.leaves import Leaves, describe_leaves
 from edgel._surface.plane_scales import SCALES
 from edgel._surface.statistics import Statistics
 
@@ -33,11 +33,14 @@ class Screening:
         Of an edge, by the cheap evidence.
     statistics : Statistics
         Of the cloud.
+    leaves : Leaves
+        Of the octree that was looked at first.
     """
 
     normals: np.ndarray
     probability: np.ndarray
     statistics: Statistics
+    leaves: Leaves
 
     @property
     def candidates(self) -> np.ndarray:
@@ -71,4 +74,4 @@ def screen(index: NeighborIndex, statistics: Statistics, forests: Mapping[str, F
         k = min(SCALES[-1], len(index))
         arguments = (np.array(SCALES), of_cloud, trees["screen"].in_step, normals, probability)
         visit_neighbors(gather.screen, at_places(index, places, places), index, k, *arguments)
-    return Screening(normals, probability, statistics)
+    return Screening(normals, probability, statistics, leaves)

@@ -79,9 +79,23 @@ class Surface:
 
         Normals are turned towards the viewpoint, or upwards (+Z) without one.
         """
-        planes = fit_nearest(self.index, at_points(self.index, edge), num_neighbors)
-        planes = towards(planes, self.xyz[edge], viewpoint)
-        creases = self.classified.take(np.isin(self.classified.points, edge[(kind & EdgeKind.CREASE) > 0]))
-        ends = (kind & OUTLINES) > 0
         outermost = self.xyz[self.classified.points[self.classified.outline > SURE]]
-        return localize(self.index, self.smoothed, edge, planes, num_neighbors, creases, ends, outermost, viewpoint)
+        return locate(self.index, self.smoothed, self.classified, outermost, edge, kind, num_neighbors, viewpoint)
+
+
+def locate(
+    index: NeighborIndex,
+    smoothed: NeighborIndex,
+    classified: Classification,
+    outermost: np.ndarray,
+    edge: np.ndarray,
+    kind: np.ndarray,
+    num_neighbors: int,
+    viewpoint: np.ndarray | None,
+) -> Faces:
+    """Say what `Surface.faces` does, of a cloud or a part of it; the surface ends at `outermost` (K, 3)."""
+    planes = fit_nearest(index, at_points(index, edge), num_neighbors)
+    planes = towards(planes, index.at(index.places_of(edge)), viewpoint)
+    creases = classified.take(np.isin(classified.points, edge[(kind & EdgeKind.CREASE) > 0]))
+    ends = (kind & OUTLINES) > 0
+    return localize(index, smoothed, edge, planes, num_neighbors, creases, ends, outermost, viewpoint)
