@@ -34,7 +34,7 @@ def keep_linked(links, strong, kept):
 
 
 def join(count: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Number the sets (count,) int64, by their first members, that pairs of things a (M,), b (M,) make of some things."""
+    """Number the sets (count,) int64, by their first members, that pairs of members a (M,), b (M,) make."""
     parents = np.arange(count)
     _join(a.astype(np.int64), b.astype(np.int64), parents)
     return np.unique(parents, return_inverse=True)[1]

@@ -5,6 +5,6 @@ is said of the whole cloud is measured at a sample; each tile is classified with
 line and the chains across seams are merged; each file's edge points are written.
 """
 
-from edgel.tiled.run import Tiled, detect
+from edgel.tiled.run import Tiled, TileError, detect
 
-__all__ = ["Tiled", "detect"]
+__all__ = ["TileError", "Tiled", "detect"]

@@ -8,8 +8,8 @@ import numpy as np
 
 from edgel._kernels.union_find import join
 from edgel._neighbors.kdtree import NeighborIndex
+from edgel._range_image import SHOWN, pixel_size, spreads_thin
 from edgel._surface.line import NEAREST, STRONG, SURE, Faint, even_probability, faint_points
-from edgel._range_image import SHOWN, spreads_thin, pixel_size
 from edgel.tiled.box import Box
 from edgel.tiled.classify import HALO, Window, open_window
 from edgel.tiled.measure import Whole

@@ -62,13 +62,11 @@ class Engine:
             future.release()
 
 
-def _here(
-    task: Callable[..., Any], jobs: dict[int, tuple[Any, ...]]
-) -> Iterator[tuple[int, BaseException | None]]:
+def _here(task: Callable[..., Any], jobs: dict[int, tuple[Any, ...]]) -> Iterator[tuple[int, BaseException | None]]:
     for number, job in jobs.items():
         try:
             task(*job)
-        except Exception as error:  # noqa: BLE001 - whatever it is, it is told at the end
+        except Exception as error:
             yield number, error
         else:
             yield number, None

@@ -21,7 +21,7 @@ from edgel._surface.rims import COUNTS as RIM_COUNTS
 from edgel._surface.surface import SURE, locate
 from edgel.edges import EdgeKind
 from edgel.tiled.box import Box
-from edgel.tiled.chains import KINDS, Known, Line, gather_known
+from edgel.tiled.chains import KINDS, Known, Line
 from edgel.tiled.classify import HALO, Window, open_window, picture_of
 from edgel.tiled.measure import Whole
 from edgel.tiled.plan import Plan

@@ -59,7 +59,9 @@ def _stamp(file: str) -> dict[str, str | int]:
 
 def _compare_inputs(folder: Path, before: list[dict], now: list[dict]) -> None:
     if [each["path"] for each in before] != [each["path"] for each in now]:
-        raise ValueError(f"{folder}: holds results of other files; overwrite them (--overwrite), or name another folder")
+        raise ValueError(
+            f"{folder}: holds results of other files; overwrite them (--overwrite), or name another folder"
+        )
     for number, (old, new) in enumerate(zip(before, now, strict=True)):
         if old == new:
             continue

@@ -27,6 +27,10 @@ TILE_POINTS = 3_000_000
 _EXPANDS = 8  # bytes of points in the spool for one of a compressed file, at most
 
 
+class TileError(OSError):
+    """Some tiles failed twice: the message names them and why, and the same call goes on with them."""
+
+
 @dataclass(frozen=True, eq=False)
 class Tiled:
     """What a run in tiles has left.
@@ -108,7 +112,7 @@ def detect(
         If a file cannot be read, lies in another frame (CRS) than the first, or is a view of its own; if the cloud is one
         that tiles cannot answer (much noise, color edges, normals of its own without a viewpoint); if the folder holds
         results of something else; if the disk is too small. The message names the file and the remedy.
-    RuntimeError
+    TileError
         If a tile failed twice; the others are done, and the same call does what is missing.
 
     Examples
@@ -187,10 +191,10 @@ def _prepare(engine: Engine, paths: Sequence[str], work: Path, options: Options)
     failed = engine.run("reading", spool, jobs)
     if failed:
         number, error = next(iter(failed.items()))
-        more = f" (and {len(failed) - 1} more files failed)" if len(failed) > 1 else ""
-        if isinstance(error, (ValueError, OSError)):
-            error.add_note(f"{paths[number]} is needed for the answer{more}: mend it or leave it out; all others are read")
-        raise error
+        more = f"; {', '.join(paths[n] for n in [*failed][1:])} failed too" if len(failed) > 1 else ""
+        raise ValueError(
+            f"{error}{more}; every file is needed for the answer: mend it, or leave it out; all others are read"
+        ) from error
     parts = [spool(path, number, work / "spool") for number, path in enumerate(paths)]
     _check_parts(parts, options)
     tiles = cut(Spool(work / "spool", parts, origin_left_out(parts)), options.tile_points)
@@ -248,7 +252,7 @@ def _raise_for(failed: dict[int, BaseException], what: str, names: Sequence[str]
     if failed:
         number, error = next(iter(failed.items()))
         where = "; ".join(f"{what} {n} ({names[n]})" for n in failed)
-        raise RuntimeError(
+        raise TileError(
             f"{where} failed twice, the first with: {error!r:.300}; all others are done, and the same call does what is "
             "missing"
         ) from error
