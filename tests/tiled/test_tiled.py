@@ -35,9 +35,9 @@ def lengths_of(files):
 
 
 @pytest.mark.parametrize("tile_points", [1_000, 3_500, 10**6])
-def test_any_tiling_gives_the_answer_of_the_whole(files, whole, tmp_path, tile_points):
+def test_any_tiling_gives_the_answer_of_the_whole(files, strip, whole, tmp_path, tile_points):
     found = tiled.detect(files, tmp_path / "out", tile_points=tile_points)
-    assert found.num_tiles == {1_000: 16, 3_500: 5, 10**6: 1}[tile_points]
+    assert len(Plan.read(tmp_path / "out" / "work").tiles) == found.num_tiles >= len(strip) / tile_points
     check_same(found, whole, lengths_of(files))
     assert found.num_edges == len(whole) > 500
     assert {*np.unique(whole.kind)} >= {edgel.EdgeKind.CREASE, edgel.EdgeKind.OCCLUDING, edgel.EdgeKind.OCCLUDED}

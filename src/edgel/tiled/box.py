@@ -14,11 +14,12 @@ class Box:
 
     Attributes
     ----------
-    low, high : (float, float)
+    low, high : tuple of float
+        Two each.
     """
 
-    low: tuple[float, float]
-    high: tuple[float, float]
+    low: tuple[float, ...]
+    high: tuple[float, ...]
 
     def touches(self, low: Any, high: Any) -> Any:
         """Whether something between two corners (..., 2), both its own, may have a point in the box."""

@@ -6,7 +6,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 _PATIENCE = 3  # workers that may die on a task before it counts as failed
@@ -26,7 +26,6 @@ class Engine:
 
     client: Any
     progress: Callable[[str], None]
-    done: list[str] = field(default_factory=list)
 
     def run(self, what: str, task: Callable[..., Any], jobs: Sequence[tuple[Any, ...]]) -> dict[int, BaseException]:
         """Run ``task(*job)`` for each; returns what those raised that failed twice, by their number."""
@@ -52,7 +51,7 @@ class Engine:
     def _by_dask(
         self, task: Callable[..., Any], jobs: dict[int, tuple[Any, ...]]
     ) -> Iterator[tuple[int, BaseException | None]]:
-        from distributed import as_completed  # heavy, and an extra
+        from distributed import as_completed  # pyright: ignore[reportMissingImports]
 
         # Names say nothing of the work: what is done is known by its files, and a scheduler forgets.
         futures = {self.client.submit(task, *job, pure=False): number for number, job in jobs.items()}
@@ -79,8 +78,8 @@ def start(workers: int, scheduler: str | None, progress: Callable[[str], None]) 
         yield Engine(None, progress)
         return
     try:
-        import dask
-        from distributed import Client, LocalCluster
+        import dask  # pyright: ignore[reportMissingImports]
+        from distributed import Client, LocalCluster  # pyright: ignore[reportMissingImports]
     except ImportError as error:
         raise ModuleNotFoundError(
             "several workers need Dask distributed: pip install edgel[tiles], or use one worker", name="distributed"

@@ -49,7 +49,7 @@ def _label(plan: Plan, whole: Whole, line: Line, tile: int) -> dict[str, np.ndar
             break
         halo *= 2
     index, viewpoint = window.index, _viewpoint(plan)
-    classified = Classification(own.points, *(own.columns[name] for name in KINDS), _evidence(own))
+    classified = Classification(own.points, own.columns["crease"], own.columns["outline"], _evidence(own))
     outermost = _outermost(plan, core, index.at(index.places_of(edge)), halo)
     faces = locate(index, index, classified, outermost, edge, kind[edge], k, viewpoint)
     if viewpoint is None:  # then nobody knows the outside

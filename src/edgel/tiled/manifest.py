@@ -7,6 +7,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import llvmlite.binding
 
@@ -52,12 +53,12 @@ def check_manifest(folder: Path, files: Sequence[str], options: Options) -> list
     return []
 
 
-def _stamp(file: str) -> dict[str, str | int]:
+def _stamp(file: str) -> dict[str, Any]:
     found = os.stat(file)
     return {"path": os.path.abspath(file), "size": found.st_size, "mtime_ns": found.st_mtime_ns}
 
 
-def _compare_inputs(folder: Path, before: list[dict], now: list[dict]) -> None:
+def _compare_inputs(folder: Path, before: list[dict[str, Any]], now: list[dict[str, Any]]) -> None:
     if [each["path"] for each in before] != [each["path"] for each in now]:
         raise ValueError(
             f"{folder}: holds results of other files; overwrite them (--overwrite), or name another folder"

@@ -87,7 +87,7 @@ def merge_measures(plan: Plan) -> Whole:
     direction = direction_that_explains(few) if plan.options.viewpoint is None else None
     if direction is not None and not (direction == (0.0, 0.0, -1.0)).all():
         raise ValueError(
-            f"points: the cloud shows as a whole along {direction.round(2).tolist()}, and tiles are columns along z; turn "
-            "it so that it is seen from above, or give a viewpoint"
+            f"points: the cloud shows as a whole along {direction.round(2).tolist()}, and tiles are columns along z; "
+            "turn it so that it is seen from above, or give a viewpoint"
         )
     return Whole(statistics_of(features.astype(np.float32), spacing), direction is not None)

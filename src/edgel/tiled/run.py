@@ -109,8 +109,8 @@ def detect(
     Raises
     ------
     FileNotFoundError, FormatError, ValueError
-        If a file cannot be read, lies in another frame (CRS) than the first, or is a view of its own; if the cloud is one
-        that tiles cannot answer (much noise, color edges, normals of its own without a viewpoint); if the folder holds
+        If a file cannot be read, lies in another frame (CRS) than the first, or is a view of its own; if the cloud is
+        one that tiles cannot answer (much noise, color edges, normals of its own without a viewpoint); if the folder holds
         results of something else; if the disk is too small. The message names the file and the remedy.
     TileError
         If a tile failed twice; the others are done, and the same call does what is missing.
@@ -180,8 +180,8 @@ def _check_disk(paths: Sequence[str], work: Path) -> None:
     free = shutil.disk_usage(work).free
     if needed > free:
         raise OSError(
-            f"{work}: about {needed / 1e9:.1f} GB are needed beside the inputs, and {free / 1e9:.1f} GB are free; name a "
-            f"folder on a larger disk ({BYTES_A_POINT} bytes a point, and the results)"
+            f"{work}: about {needed / 1e9:.1f} GB are needed beside the inputs, and {free / 1e9:.1f} GB are free; name "
+            f"a folder on a larger disk ({BYTES_A_POINT} bytes a point, and the results)"
         )
 
 
@@ -190,7 +190,7 @@ def _prepare(engine: Engine, paths: Sequence[str], work: Path, options: Options)
     jobs = [(path, number, work / "spool") for number, path in enumerate(paths)]
     failed = engine.run("reading", spool, jobs)
     if failed:
-        number, error = next(iter(failed.items()))
+        error = next(iter(failed.values()))
         more = f"; {', '.join(paths[n] for n in [*failed][1:])} failed too" if len(failed) > 1 else ""
         raise ValueError(
             f"{error}{more}; every file is needed for the answer: mend it, or leave it out; all others are read"
@@ -215,7 +215,7 @@ def _check_parts(parts: Sequence[Part], options: Options) -> None:
             )
         if part.normals and options.viewpoint is None:
             raise ValueError(
-                f"{part.path}: has normals of its own, which would say which side is outside, and tiles do not ask them; "
+                f"{part.path}: has normals of its own, which would tell the outside, and tiles do not ask them; "
                 "give a viewpoint, or leave out nx, ny and nz"
             )
 
@@ -250,11 +250,11 @@ def _label(folder: Path, whole: Any, line: Any, tile: int) -> None:
 
 def _raise_for(failed: dict[int, BaseException], what: str, names: Sequence[str]) -> None:
     if failed:
-        number, error = next(iter(failed.items()))
+        error = next(iter(failed.values()))
         where = "; ".join(f"{what} {n} ({names[n]})" for n in failed)
         raise TileError(
-            f"{where} failed twice, the first with: {error!r:.300}; all others are done, and the same call does what is "
-            "missing"
+            f"{where} failed twice, the first with: {error!r:.300}; all others are done, and the same call does "
+            "what is missing"
         ) from error
 
 

@@ -22,7 +22,7 @@ from edgel.io import read
 from edgel.tiled.box import Box
 
 ROWS = 40  # bits of a key that tell the row in its file; those above tell the file
-_PER_BLOCK = 4096  # points of a block, about
+_PER_BLOCK = 512  # points of a block, about
 BYTES_A_POINT = 32
 
 
