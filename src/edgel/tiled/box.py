@@ -27,7 +27,8 @@ class Box:
 
     def holds(self, xyz: np.ndarray) -> np.ndarray:
         """Whether each point (N, 3) lies in the box, (N,) bool."""
-        return (xyz[:, :2] >= self.low).all(axis=1) & (xyz[:, :2] < self.high).all(axis=1)
+        inside: np.ndarray = (xyz[:, :2] >= self.low) & (xyz[:, :2] < self.high)
+        return inside.all(axis=1)
 
     def grown(self, halo: float, step: float) -> Box:
         """Return the box with a halo around it, its sides moved outwards to multiples of a step."""

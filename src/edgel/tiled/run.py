@@ -110,8 +110,8 @@ def detect(
     ------
     FileNotFoundError, FormatError, ValueError
         If a file cannot be read, lies in another frame (CRS) than the first, or is a view of its own; if the cloud is
-        one that tiles cannot answer (much noise, color edges, normals of its own without a viewpoint); if the folder holds
-        results of something else; if the disk is too small. The message names the file and the remedy.
+        one that tiles cannot answer (much noise, color edges, normals of its own without a viewpoint); if the folder
+        holds results of something else; if the disk is too small. The message names the file and the remedy.
     TileError
         If a tile failed twice; the others are done, and the same call does what is missing.
 
