@@ -28,7 +28,7 @@ class Box:
     def holds(self, xyz: np.ndarray) -> np.ndarray:
         """Whether each point (N, 3) lies in the box, (N,) bool."""
         inside: np.ndarray = (xyz[:, :2] >= self.low) & (xyz[:, :2] < self.high)
-        return inside.all(axis=1)
+        return np.asarray(inside.all(axis=1))
 
     def grown(self, halo: float, step: float) -> Box:
         """Return the box with a halo around it, its sides moved outwards to multiples of a step."""
