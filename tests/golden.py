@@ -15,7 +15,7 @@ import edgel
 from edgel import Cloud, synth
 
 FILE = Path(__file__).parent / "golden.npz"
-FIELDS = ("index", "kind", "strength", "position", "position_std", "direction", "normals", "angle", "convex")
+FIELDS = ("index", "kind", "strength", "position", "position_std", "scale", "direction", "normals", "angle", "convex")
 PLANES = ("normals", "offset", "residual", "variation")
 EVERY = 20  # of how many points the plane fits are kept
 

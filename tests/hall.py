@@ -3,7 +3,18 @@
 import numpy as np
 
 TIMEOUT = 180.0  # seconds: the first detection compiles the kernels
-PER_POINT = ("index", "kind", "strength", "position", "position_std", "direction", "normals", "angle", "convex")
+PER_POINT = (
+    "index",
+    "kind",
+    "strength",
+    "position",
+    "position_std",
+    "scale",
+    "direction",
+    "normals",
+    "angle",
+    "convex",
+)
 
 
 def roof(slope=1.0, side=60):

@@ -33,6 +33,7 @@ def edges_of_three(kind=(EdgeKind.CREASE, EdgeKind.BOUNDARY | EdgeKind.CREASE, E
         strength=np.array([1.0, 0.5, 0.1]),
         position=cloud_of_five().xyz[index] + [0.001, 0, 0],
         position_std=np.array([0.01, 0.002, NAN]),
+        scale=np.array([0.5, 2.0, NAN]),
         direction=direction,
         normals=normals,
         angle=np.array([np.pi / 2, np.arccos(0.8), NAN]),

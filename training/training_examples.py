@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import landscapes
 import numpy as np
 import random_scenes
 import reliefs
 from random_scenes import Example
 
-RELIEFS = 0.1  # share of the examples
+RELIEFS, LANDSCAPES = 0.1, 0.12  # share of the examples
 
 
 def example(seed: int) -> Example:
     """Make the example of a seed."""
     rng = np.random.default_rng([seed, 20261125])
-    return reliefs.make(rng) if rng.random() < RELIEFS else random_scenes.make(rng)
+    drawn = rng.random()
+    kind = reliefs if drawn < RELIEFS else landscapes if drawn < RELIEFS + LANDSCAPES else random_scenes
+    return kind.make(rng)

@@ -12,7 +12,7 @@ from edgel._labels import LIKELY, label_edges, strength_of_contrast
 from edgel._neighbors.normals import check_num_neighbors
 from edgel._neighbors.orientation import check_orient, who_knows
 from edgel._range_image import METHODS, choose_view, see_edges, without_no_return
-from edgel._scale import at_scale, check_scale
+from edgel._scale import at_scale, check_max_scale, check_scale, over_scales
 from edgel._sides import orient_faces, viewer_of
 from edgel._stages import Stages
 from edgel._surface import Surface
@@ -29,6 +29,7 @@ def detect(
     method: Literal["auto", "surface", "organized", "orthographic", "pinhole", "spherical"] = "auto",
     min_strength: float = LIKELY,
     scale: float = 1.0,
+    max_scale: float | None = None,
     num_neighbors: int = 16,
     viewpoint: Any = None,
     orient: Literal["auto", "outward"] = "auto",
@@ -54,6 +55,10 @@ def detect(
     scale : float
         Size of the smallest edges wanted, in median spacings, 1 or more: above 1 the cloud is thinned to one point a
         voxel of that size first, and what is smaller cannot be seen.
+    max_scale : float, optional
+        Largest scale at which softer edges are looked for too, in median spacings: what is rounded over several
+        spacings, as by a fillet or by wear, is sharp where the cloud is thinned to twice the scale, four times, and so
+        on. `Edges.of_scale` tells them apart again. Default: `scale`, so that no other is looked at.
     num_neighbors : int
         k of the plane fits that give the normals, the point itself among them; at least 3.
     viewpoint : (3,) array_like, optional
@@ -92,6 +97,11 @@ def detect(
     _check_options(method, min_strength, scale)
     check_orient(orient, has_viewpoint=viewpoint is not None)
     options = {"kinds": kinds, "method": method, "min_strength": min_strength, "num_neighbors": num_neighbors}
+    max_scale = check_max_scale(max_scale, scale)
+    if max_scale > scale:
+        return over_scales(
+            detect, points, scale, max_scale, progress=progress, viewpoint=viewpoint, orient=orient, **options
+        )
     if scale > 1:
         return at_scale(detect, points, scale, progress=progress, viewpoint=viewpoint, orient=orient, **options)
     cloud, stages = as_cloud(points), Stages(progress)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -18,6 +18,8 @@ class Faces:
         Foot of the point on the line in which the faces meet, or on that along which the surface ends.
     position_std : (M,) float64
         Root of the mean squared distance, in the cloud's unit, at which that line is to be expected from there.
+    scale : (M,) float64
+        Radius, in the cloud's unit, of the smallest neighbourhood that shows most of the edge.
     direction : (M, 3) float64
         Unit tangent of that line.
     normals : (M, 2, 3) float64
@@ -30,6 +32,7 @@ class Faces:
 
     position: np.ndarray
     position_std: np.ndarray
+    scale: np.ndarray
     direction: np.ndarray
     normals: np.ndarray
     angle: np.ndarray
@@ -41,16 +44,23 @@ class Faces:
         return cls(
             position=xyz.copy(),
             position_std=np.full(len(xyz), np.nan),
+            scale=np.full(len(xyz), np.nan),
             direction=np.full((len(xyz), 3), np.nan),
             normals=np.stack([normals, np.full_like(normals, np.nan)], axis=1),
             angle=np.full(len(xyz), np.nan),
             convex=np.zeros(len(xyz), np.int8),
         )
 
-    def put(self, rows: np.ndarray, other: Faces, which: np.ndarray) -> None:
+    def put(self, rows: np.ndarray, other: Faces, which: np.ndarray | slice) -> None:
         """Overwrite some rows (K,) with rows `which` (K,) of other faces."""
         for name in Faces.__dataclass_fields__:
             getattr(self, name)[rows] = getattr(other, name)[which]
+
+    def along(self, xyz: np.ndarray, rows: np.ndarray) -> Self:
+        """Return the faces of rows (K,) at points (K, 3) beside them: the line is straight, all else is the same."""
+        taken = type(self)(*(getattr(self, name)[rows] for name in Faces.__dataclass_fields__))
+        on = ((xyz - taken.position) * np.nan_to_num(taken.direction)).sum(axis=1, keepdims=True)
+        return replace(taken, position=taken.position + on * np.nan_to_num(taken.direction))
 
 
 def inside_of(out: np.ndarray, xyz: np.ndarray, viewpoint: np.ndarray | None) -> np.ndarray:

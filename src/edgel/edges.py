@@ -42,11 +42,22 @@ FIRST_COLUMNS = ("edge_kind", "edge_strength", "edge_angle", "edge_convex", "nx"
 """What `Edges.label` adds to a cloud, and `Edges.to_cloud` before its own."""
 _FACE_COLUMNS, _TANGENT_COLUMNS = ("nx2", "ny2", "nz2"), ("tx", "ty", "tz")
 _PLACE_COLUMNS = ("edge_x", "edge_y", "edge_z")
-_STD_COLUMN = "edge_std"
-ALL_COLUMNS = (*FIRST_COLUMNS, *_FACE_COLUMNS, *_TANGENT_COLUMNS, *_PLACE_COLUMNS, _STD_COLUMN)
+_STD_COLUMN, _SCALE_COLUMN = "edge_std", "edge_scale"
+ALL_COLUMNS = (*FIRST_COLUMNS, *_FACE_COLUMNS, *_TANGENT_COLUMNS, *_PLACE_COLUMNS, _STD_COLUMN, _SCALE_COLUMN)
 """What `Edges.to_cloud` adds."""
 
-_PER_POINT = ("index", "kind", "strength", "position", "position_std", "direction", "normals", "angle", "convex")
+_PER_POINT = (
+    "index",
+    "kind",
+    "strength",
+    "position",
+    "position_std",
+    "scale",
+    "direction",
+    "normals",
+    "angle",
+    "convex",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +77,9 @@ class Edges:
     position_std : (E,) float64
         How sure the position is: standard deviation of its distance from the edge (root mean square), in the cloud's
         unit; NaN where that is not known, as where the edge could not be placed better than the point.
+    scale : (E,) float64
+        Radius, in the cloud's unit, of the smallest neighbourhood that shows most of the edge: one or two spacings
+        where it is sharp, about as much as its rounding where it is soft; NaN where only a view's windows show it.
     direction : (E, 3) float64
         Unit tangent of the edge, of either sign; NaN where unknown.
     normals : (E, 2, 3) float64
@@ -99,6 +113,7 @@ class Edges:
     strength: np.ndarray
     position: np.ndarray
     position_std: np.ndarray
+    scale: np.ndarray
     direction: np.ndarray
     normals: np.ndarray
     angle: np.ndarray
@@ -143,6 +158,13 @@ class Edges:
         """Return some of the edge points (int, ascending, or bool (E,)); times and parameters stay those of all."""
         return replace(self, **{name: getattr(self, name)[rows] for name in _PER_POINT})
 
+    def join(self, other: Self) -> Self:
+        """Return the edge points of both, found in the same input, by row; what is not said by point stays as it is."""
+        columns = {name: np.concatenate([getattr(self, name), getattr(other, name)]) for name in _PER_POINT}
+        order = np.argsort(columns["index"], kind="stable")
+        kept = order[np.diff(columns["index"][order], prepend=-1) > 0]
+        return replace(self, **{name: column[kept] for name, column in columns.items()})
+
     def of_kinds(self, kinds: EdgeKind | str | Iterable[str]) -> Self:
         """Return the edge points that are of some kinds (see `as_kinds`), without their flags of other kinds.
 
@@ -163,6 +185,21 @@ class Edges:
         kind = np.where(blunt, self.kind & ~np.uint8(EdgeKind.CREASE), self.kind)
         return replace(self, kind=kind).take(kind > 0)
 
+    def of_scale(self, low: float = 0.0, high: float = float("inf")) -> Self:
+        """Return the edge points whose `scale` lies in [low, high], in the cloud's unit; where it is NaN they stay.
+
+        Low scales are sharp edges, high ones fillets, worn edges and soft folds; `max_scale` of `edgel.detect` looks
+        for those that are too soft to be seen otherwise.
+
+        Raises
+        ------
+        ValueError
+            If low is above high, or either is no number.
+        """
+        if not low <= high:
+            raise ValueError(f"low, high: expected two lengths, the first at most the second, got {low} and {high}")
+        return self.take(~((self.scale < low) | (self.scale > high)))
+
     def crop(self, points: Any, box: Any) -> Self:
         """Return the edge points of the input that lie in a box: its lower and its upper corner (2, 3), maybe infinite.
 
@@ -181,17 +218,16 @@ class Edges:
 
         That is ``edge_kind`` (uint8), ``edge_strength``, ``edge_angle`` (radians), ``edge_convex`` (int8), the normals
         ``nx ny nz`` and ``nx2 ny2 nz2`` of the two faces, the tangent ``tx ty tz``, and the refined position ``edge_x
-        edge_y edge_z`` (float64) with its standard deviation ``edge_std``; float32 but for those named otherwise, NaN
-        where unknown. Attributes of the input
-        that have one of these names are kept as ``input_nx`` and so on, ``input_nx_2``
-        where that is there too, as after a second run.
+        edge_y edge_z`` (float64) with its standard deviation ``edge_std`` and the edge's ``edge_scale``; float32 but
+        for those named otherwise, NaN where unknown. Attributes of the input that have one of these names are kept as
+        ``input_nx`` and so on, ``input_nx_2`` where that is there too, as after a second run.
         """
         cloud = make_room(as_cloud(points).take(self.index), ALL_COLUMNS)
         columns = self._describe(len(self), np.arange(len(self)))
         columns |= _columns(self.normals[:, 1], _FACE_COLUMNS, np.float32)
         columns |= _columns(self.direction, _TANGENT_COLUMNS, np.float32)
         columns |= _columns(self.position, _PLACE_COLUMNS, np.float64)
-        columns |= {_STD_COLUMN: self.position_std.astype(np.float32)}
+        columns |= {_STD_COLUMN: self.position_std.astype(np.float32), _SCALE_COLUMN: self.scale.astype(np.float32)}
         return cloud.with_attributes(**columns)
 
     def label(self, points: Any) -> Cloud:

@@ -16,7 +16,7 @@ from edgel import tiled
 from edgel.tiled import engine, run
 from edgel.tiled.plan import Plan
 
-FIELDS = ("kind", "strength", "position", "position_std", "direction", "normals", "angle", "convex")
+FIELDS = ("kind", "strength", "position", "position_std", "scale", "direction", "normals", "angle", "convex")
 
 
 def check_same(found, whole, lengths):

@@ -74,7 +74,7 @@ class Tiling:
 def detect_as_one(
     words: Sequence[str],
     output: str | None,
-    extension: str | None,
+    output_format: str | None,
     method: str,
     given: dict[str, Any],
     refused: dict[str, Any],
@@ -94,7 +94,7 @@ def detect_as_one(
     if files.PIPE in sources:
         raise Failure(ExitCode.USAGE, "-: stdin is read once, and tiles read several times; name files instead")
     todo = [Job(f"{count(len(sources))} files as one" if len(sources) > 1 else sources[0], output)]
-    work = partial(_detect, sources, extension, given, tiling, max(workers, 1))
+    work = partial(_detect, sources, options.extension(output_format), given, tiling, max(workers, 1))
     run_jobs(todo, work, talk)
 
 

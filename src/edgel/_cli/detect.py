@@ -114,6 +114,15 @@ def detect(
             metavar="SPACINGS",
         ),
     ] = None,
+    max_scale: Annotated[
+        float | None,
+        options.option(
+            edgel.detect,
+            "max_scale",
+            "Look for soft edges too, as of fillets or worn parts, at twice the scale, four times, up to this.",
+            metavar="SPACINGS",
+        ),
+    ] = None,
     min_angle: Annotated[
         float | None,
         options.own(
@@ -174,6 +183,7 @@ def detect(
         viewpoint=viewpoint,
         orient=orient,
         scale=scale,
+        max_scale=max_scale,
         width=width,
         height=height,
         kernel_size=kernel_size,
@@ -193,13 +203,11 @@ def detect(
         if as_one:
             refused = {"intrinsics": intrinsics, "columns": columns, "sample_mesh": sample_mesh, "where": where}
             refused |= {"all": label_all, "report": report, "min_angle": min_angle, "crop": crop, "clobber": clobber}
-            extension = options.extension(output_format)
-            tiles.detect_as_one(sources, output, extension, method, given, refused, tiling, talk, workers)
+            tiles.detect_as_one(sources, output, output_format, method, given, refused, tiling, talk, workers)
             return
         tiling.check_unused()
         reading = files.Reading(intrinsics, columns, sample_mesh)
-        condition = None if where is None else Where(where)
-        wanted = _Wanted(reading, condition, method, given, min_angle, crop, label_all)
+        wanted = _Wanted(reading, where and Where(where), method, given, min_angle, crop, label_all)
         extension = options.extension(output_format)
         todo = jobs.plan(sources, reading, output=output, extension=extension, report=report, clobber=clobber)
         run_jobs(todo, partial(_detect, wanted), talk, workers=workers)

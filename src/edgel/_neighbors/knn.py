@@ -19,6 +19,7 @@ from edgel._neighbors.candidates import CHUNK, gather_blocks, larger_scratch, ma
 from edgel._neighbors.kdtree import NeighborIndex
 from edgel._neighbors.queries import Queries, anywhere, tree_of
 from edgel._neighbors.search import first_of, nearest_of_eight
+from edgel._neighbors.stretched import list_stretched
 
 _SLICE = 1024  # queries whose neighbours exist at a time, for each thread
 
@@ -94,6 +95,8 @@ def visit_neighbors(
         places = np.zeros((stop - start, num_neighbors), np.int64)  # a place even where no distance is a number
         squared = np.empty((stop - start, num_neighbors))
         _list(start, stop, asked, tree, places, squared)
+        if queries.are_stretched:
+            list_stretched(start, stop, queries.xyz, tree, places, squared)
         visit(start, places, squared, queries.xyz, queries.targets, index.xyz, *arguments)
 
     run_slices(work, len(queries), size=_SLICE)

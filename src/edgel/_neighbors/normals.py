@@ -9,7 +9,7 @@ import numpy as np
 from edgel._kernels.parallel import run_slices
 from edgel._neighbors.kdtree import NeighborIndex
 from edgel._neighbors.knn import visit_neighbors
-from edgel._neighbors.plane_fits import fit_slice, fit_sorted
+from edgel._neighbors.plane_fits import fit_listed, fit_slice
 from edgel._neighbors.queries import Queries, tree_of
 
 SENSOR, OWN, OUTWARD, UNKNOWN = "sensor", "normals", "outward", "unknown"
@@ -96,7 +96,7 @@ def fit_nearest(index: NeighborIndex, queries: Queries, num_neighbors: int) -> N
     count = len(queries)
     planes = Normals(np.empty((count, 3)), np.empty(count), np.empty(count), np.empty(count))
     results = (planes.normals, planes.offset, planes.residual, planes.variation)
-    visit_neighbors(fit_sorted, queries, index, min(num_neighbors, len(index)), *results)
+    visit_neighbors(fit_listed, queries, index, min(num_neighbors, len(index)), *results)
     return planes
 
 
@@ -118,6 +118,9 @@ def _fit(index: NeighborIndex, queries: Queries, num_neighbors: int, limits: np.
     count = len(queries)
     planes = Normals(np.empty((count, 3)), np.empty(count), np.empty(count), np.empty(count))
     results = (planes.normals, planes.offset, planes.residual, planes.variation)
+    if queries.are_stretched:
+        visit_neighbors(fit_listed, queries, index, num_neighbors, *results)
+        return planes
     run_slices(fit_slice, count, queries.arrays, tree_of(index), num_neighbors, *results, limits, size=_SLICE)
     return planes
 

@@ -12,7 +12,8 @@ from edgel._kernels.parallel import kernel
 from edgel._neighbors.kdtree import NeighborIndex
 from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.normals import OUTWARD, OWN, SENSOR, UNKNOWN, Normals, fit_planes, no_planes
-from edgel._neighbors.queries import every_place
+from edgel._neighbors.queries import Queries, every_place
+from edgel._neighbors.scan_lines import scan_line_normals, scan_line_stretch
 from edgel._objects import NORMALS
 from edgel.cloud import Cloud
 
@@ -21,6 +22,10 @@ WORSE = 2.0  # times the spread off the plane of fewer neighbours: with more the
 ORIENTS = ("auto", OUTWARD)
 
 NEIGHBORS, SECTORS = 48, 8  # of the neighbours of a point, the nearest in each sector is compared with it
+_PARALLEL = (
+    0.8  # cosine of two planes that may be both sides of a plate, whose lines lie farther apart than it is thick
+)
+_STEP = (0.05, 0.6)  # share off the planes, squared, of the way between points on them that does not tell
 SPARSE = 2.0  # times the median distance of neighbours: points that lie farther apart may be stray
 _DIRECTIONS = np.array(
     [np.array(d) / np.linalg.norm(d) for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)]
@@ -66,11 +71,15 @@ def outward_normals(index: NeighborIndex) -> np.ndarray:
     between them: one pair that errs decides nothing. Last, the outermost points of each piece look outwards.
     """
     order, count = index.order, len(index)
-    planes = _steady_planes(index)
+    stretch = scan_line_stretch(index)
+    queries = every_place(index, stretch)
+    planes = _steady_planes(index, queries)
+    if stretch is not None:
+        _put_lines(planes, index)
     xyz, normals = np.ascontiguousarray(index.xyz.T), planes.normals
     near, agreement = np.empty((count, SECTORS), np.int64), np.empty((count, SECTORS))
     k = min(NEIGHBORS, count)
-    visit_neighbors(_agree, every_place(index), index, k, normals, planes.offset, near, agreement)
+    visit_neighbors(_agree, queries, index, k, normals, planes.offset, near, agreement)
     reach = np.linalg.norm(xyz[near] - xyz[:, None], axis=2).mean(axis=1)
     sign, piece = _join(np.repeat(np.arange(count), near.shape[1]), near.ravel(), agreement.ravel())
     sure = (agreement * sign[:, None] * sign[near]).mean(axis=1) - (reach > SPARSE * np.median(reach))
@@ -80,12 +89,12 @@ def outward_normals(index: NeighborIndex) -> np.ndarray:
     return outward
 
 
-def _steady_planes(index: NeighborIndex) -> Normals:
+def _steady_planes(index: NeighborIndex, queries: Queries) -> Normals:
     """Fit a plane at each place to as many neighbours as lie on it no less well than fewer do.
 
     Few keep to one face of a blade or a plate, many average noise away.
     """
-    queries, planes, spread = every_place(index), no_planes(len(index)), np.full(len(index), np.inf)
+    planes, spread = no_planes(len(index)), np.full(len(index), np.inf)
     going_on = np.ones(len(index), bool)
     for k in COUNTS:
         if k > len(index) and k > COUNTS[0]:
@@ -99,6 +108,14 @@ def _steady_planes(index: NeighborIndex) -> Normals:
     return planes
 
 
+def _put_lines(planes: Normals, index: NeighborIndex) -> None:
+    """Put in the planes through scan lines, where they are known: they keep to one side of the thinnest plate."""
+    normals = scan_line_normals(index, np.arange(len(index)))
+    known = np.isfinite(normals[:, 0])
+    planes.normals[known] = normals[known]
+    planes.offset[known] = (normals * index.xyz.T).sum(axis=1)[known]
+
+
 @kernel
 def _agree(first, places, squared, queries, targets, xyz, normals, offset, near, agreement):
     """Choose the nearest neighbour in each of some sectors of the tangent plane, and say how far both normals agree.
@@ -107,6 +124,7 @@ def _agree(first, places, squared, queries, targets, xyz, normals, offset, near,
     surface has both, since that mirrors one face of a crease onto the other, as it does two points of an arc. Points
     are laid onto their planes first, or noise would tilt what lies between near ones.
     """
+    stretched = queries.shape[0] > 3
     for q in range(places.shape[0]):
         p = targets[first + q]
         near[p], agreement[p] = p, 0.0
@@ -129,7 +147,10 @@ def _agree(first, places, squared, queries, targets, xyz, normals, offset, near,
             apart = x * x + y * y + z * z
             cosine = nx * mx + ny * my + nz * mz
             if apart > 0.0:
-                cosine -= 2.0 * (x * nx + y * ny + z * nz) * (x * mx + y * my + z * mz) / apart
+                off = (x * nx + y * ny + z * nz) * (x * mx + y * my + z * mz) / apart
+                if stretched and abs(cosine) > _PARALLEL and _STEP[0] < abs(off) < _STEP[1]:
+                    continue
+                cosine -= 2.0 * off
             if np.isfinite(cosine):
                 near[p, sector], agreement[p, sector] = j, cosine
                 left -= 1

@@ -1,14 +1,15 @@
-"""Plane fits to the k nearest neighbours of eight points in step."""
+"""Plane fits to the k nearest neighbours: of eight points in step, and of any neighbours that are listed."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from edgel._kernels.eigen import smallest_eigenpair, smallest_eigenpairs
-from edgel._kernels.moments import scatter
+from edgel._kernels.moments import add_moments, scatter
 from edgel._kernels.parallel import kernel, part
 from edgel._kernels.simd import LANES, larger, load, multiply_add, spread, store, where
 from edgel._neighbors.candidates import CHUNK, gather_blocks, larger_scratch, make_scratch
+from edgel._neighbors.neighborhood import relative
 from edgel._neighbors.search import nearest_of_eight
 
 # Below this share of the largest variance the middle one is rounding: the neighbours lie on a line, or on one spot.
@@ -84,26 +85,21 @@ def _fit_eight(tree, scratch, count, k, planes):
 
 
 @kernel
-def fit_sorted(first, places, squared, queries, targets, xyz, normals, offset, residual, variation):
-    """Fit planes to neighbours that are sorted by their distance; writes what `fit_slice` does."""
+def fit_listed(first, places, squared, queries, targets, xyz, normals, offset, residual, variation):
+    """Fit planes to listed neighbours, as they lie whatever the stretch that chose them."""
+    k = places.shape[1]
+    vectors, sums = np.empty((3, k)), np.empty(9)
     for q in range(places.shape[0]):
-        row, k = targets[first + q], places.shape[1]
-        x, y, z = queries[0, first + q], queries[1, first + q], queries[2, first + q]
-        mx, my, mz = 0.0, 0.0, 0.0
-        xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for i in range(k):
-            p = places[q, i]
-            dx, dy, dz = xyz[0, p] - x, xyz[1, p] - y, xyz[2, p] - z
-            mx, my, mz = mx + dx, my + dy, mz + dz
-            xx, xy, xz, yy, yz, zz = xx + dx * dx, xy + dx * dy, xz + dx * dz, yy + dy * dy, yz + dy * dz, zz + dz * dz
-        cx, cy, cz = mx / k, my / k, mz / k
-        xx, xy, xz, yy, yz, zz = scatter(cx, cy, cz, mx, my, mz, xx, xy, xz, yy, yz, zz)
+        relative(places[q], queries[:3], first + q, xyz, vectors)
+        sums[:] = 0.0
+        add_moments(vectors, 0, k, sums)
+        mx, my, mz, cx, cy, cz = sums[0], sums[1], sums[2], sums[0] / k, sums[1] / k, sums[2] / k
+        xx, xy, xz, yy, yz, zz = scatter(cx, cy, cz, mx, my, mz, sums[3], sums[4], sums[5], sums[6], sums[7], sums[8])
         smallest, middle, nx, ny, nz = smallest_eigenpair(xx, xy, xz, yy, yz, zz)
-        trace = xx + yy + zz
-        down = nz < 0.0 or (nz == 0.0 and (ny < 0.0 or (ny == 0.0 and nx < 0.0)))
-        sign = np.nan if middle <= _FLAT * trace else -1.0 if down else 1.0
-        nx, ny, nz, smallest = nx * sign, ny * sign, nz * sign, max(smallest, 0.0)
-        normals[row, 0], normals[row, 1], normals[row, 2] = nx, ny, nz
-        offset[row] = nx * (x + cx) + ny * (y + cy) + nz * (z + cz)
-        residual[row] = smallest * sign * sign
-        variation[row] = smallest / trace * sign * sign
+        row, trace, smallest = targets[first + q], xx + yy + zz, max(smallest, 0.0)
+        sign = -1.0 if nz < 0.0 or (nz == 0.0 and (ny < 0.0 or (ny == 0.0 and nx < 0.0))) else 1.0
+        sign = np.nan if middle <= _FLAT * trace else sign
+        normals[row, 0], normals[row, 1], normals[row, 2] = sign * nx, sign * ny, sign * nz
+        x, y, z = queries[0, first + q] + cx, queries[1, first + q] + cy, queries[2, first + q] + cz
+        offset[row] = sign * (nx * x + ny * y + nz * z)
+        residual[row], variation[row] = smallest * abs(sign), smallest / trace * abs(sign)

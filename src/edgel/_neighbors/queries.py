@@ -36,8 +36,9 @@ class Queries:
 
     Attributes
     ----------
-    xyz : (3, M) float64
-        Coordinates, one axis a row.
+    xyz : (3, M) or (6, M) float64
+        Coordinates, one axis a row; below them, where neighbours are wanted in a metric of each query's own, its
+        stretch: see `edgel._neighbors.stretched`.
     targets : (M,) int64
         Where the results of each query go: a permutation.
     """
@@ -45,13 +46,18 @@ class Queries:
     xyz: np.ndarray
     targets: np.ndarray
 
+    @property
+    def are_stretched(self) -> bool:
+        """Whether queries have metrics of their own."""
+        return len(self.xyz) > 3
+
     def __len__(self) -> int:
         return len(self.targets)
 
     @property
     def arrays(self) -> QueryArrays:
         """The arrays that kernels take."""
-        x, y, z = self.xyz
+        x, y, z = self.xyz[:3]
         return QueryArrays(x, y, z, self.targets)
 
 
@@ -66,26 +72,36 @@ def every_point(index: NeighborIndex) -> Queries:
     return Queries(index.xyz, index.order)
 
 
-def every_place(index: NeighborIndex) -> Queries:
-    """Ask at every point of an index; the results are in the order of the places."""
-    return Queries(index.xyz, np.arange(len(index)))
+def every_place(index: NeighborIndex, stretch: np.ndarray | None = None) -> Queries:
+    """Ask at every point of an index, with its stretch (3, N) where there is one; the results are in places' order."""
+    xyz = index.xyz if stretch is None else np.concatenate([index.xyz, stretch])
+    return Queries(xyz, np.arange(len(index)))
 
 
-def at_places(index: NeighborIndex, places: np.ndarray, targets: np.ndarray | None = None) -> Queries:
+def at_places(
+    index: NeighborIndex, places: np.ndarray, targets: np.ndarray | None = None, stretch: np.ndarray | None = None
+) -> Queries:
     """Ask at some places (M,) of an index, ascending, which lie in its order already; no tree of their own is needed.
 
-    The results are in the order of the places, unless `targets` (M,) says where each goes.
+    The results are in the order of the places, unless `targets` (M,) says where each goes. Takes the stretch (3, N) at
+    every place, where there is one.
     """
-    return Queries(index.xyz.take(places, axis=1), np.arange(len(places)) if targets is None else targets)
+    xyz = index.xyz.take(places, axis=1)
+    if stretch is not None:
+        xyz = np.concatenate([xyz, stretch.take(places, axis=1)])
+    return Queries(xyz, np.arange(len(places)) if targets is None else targets)
 
 
-def at_points(index: NeighborIndex, points: np.ndarray) -> Queries:
-    """Ask at some points (M,) of an index, each once; the results are in their order."""
+def at_points(index: NeighborIndex, points: np.ndarray, stretch: np.ndarray | None = None) -> Queries:
+    """Ask at some points (M,) of an index, each once; the results are in their order.
+
+    Takes the stretch (3, N) at every place, where there is one.
+    """
     number = np.full(len(index), -1)
     number[points] = np.arange(len(points))
     targets = number[index.order]
     places = np.flatnonzero(targets >= 0)
-    return at_places(index, places, targets[places])
+    return at_places(index, places, targets[places], stretch)
 
 
 def anywhere(xyz: np.ndarray) -> Queries:

@@ -42,7 +42,7 @@ def thin(points: Any, size: float) -> np.ndarray:
     xyz = checked.xyz
     place = (xyz - xyz.min(axis=0)) / size
     cell = np.floor(place)
-    voxel = _voxels(cell)
+    voxel = number_voxels(cell)
     away = ((place - cell - 0.5) ** 2).sum(axis=1)
     least = np.full(voxel.max() + 1, np.inf)
     np.minimum.at(least, voxel, away)
@@ -54,7 +54,7 @@ def thin(points: Any, size: float) -> np.ndarray:
     return checked.rows[np.sort(np.concatenate([alone, order[first]]))]
 
 
-def _voxels(cell: np.ndarray) -> np.ndarray:
+def number_voxels(cell: np.ndarray) -> np.ndarray:
     """Number the voxels that are occupied, of each point's cell along the axes (N, 3), at least 0; (N,) int64."""
     counts = cell.max(axis=0) + 1
     if counts.prod() < _MOST_CELLS:

@@ -103,6 +103,7 @@ class SeenEdges:
         return Faces(
             position=foot,
             position_std=np.full(len(foot), np.nan),
+            scale=np.full(len(foot), np.nan),
             direction=line / np.linalg.norm(line, axis=1, keepdims=True),
             normals=normals,
             angle=np.arccos(np.clip(cosine, -1, 1)),

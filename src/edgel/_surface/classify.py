@@ -52,7 +52,7 @@ def classify(index: NeighborIndex, screening: Screening) -> Classification:
         parts.append(evidence.take(likely))
     places = np.concatenate([np.zeros(0, np.int64), *kept])
     (crease, outline), evidence = np.concatenate([np.zeros((2, 0)), *probabilities], axis=1), Evidence.join(parts)
-    features = with_context(index, places, evidence, crease, outline)
+    features = with_context(index, places, evidence, crease, outline, screening.stretch)
     points = index.order[places]
     ascending = np.argsort(points)
     return Classification(

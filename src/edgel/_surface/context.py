@@ -12,8 +12,8 @@ import numpy as np
 
 from edgel._kernels.eigen import smallest_eigenpair
 from edgel._kernels.parallel import kernel
+from edgel._neighbors.neighborhood import drop_foot, relative, stretch, stretch_direction
 from edgel._neighbors.spacing import disc_spacing
-from edgel._surface.neighborhood import relative
 
 NEIGHBORS = 24
 
@@ -54,7 +54,8 @@ def gather_context(first, places, squared, queries, targets, xyz, probabilities,
     the direction of its line and the foot on it, is its own, (N,) int32, -1 for none. Writes `features`, `FEATURES` of
     either kind (2, Q, 19).
     """
-    away = np.empty((3, places.shape[1]))
+    k = places.shape[1]
+    away, near_lines, near_feet = np.empty((3, k)), np.empty((k, 3), np.float32), np.empty((k, 3), np.float32)
     for q in range(places.shape[0]):
         row, spacing = targets[first + q], disc_spacing(squared[q])
         if spacing == 0.0:
@@ -62,6 +63,14 @@ def gather_context(first, places, squared, queries, targets, xyz, probabilities,
             continue
         relative(places[q], queries, first + q, xyz, away)
         away /= spacing
+        for i in range(k):
+            j = slot[places[q, i]]
+            if j >= 0:
+                near_lines[i], near_feet[i] = lines[j], feet[j]
+                if queries.shape[0] > 3:
+                    stretch_direction(queries[3:, first + q], near_lines[i], 0)
+                    stretch(queries[3:, first + q], near_feet[i], 0)
+                    drop_foot(near_feet[i], 0, near_lines[i], 0)
         for kind in range(2):
             _describe(
                 places[q],
@@ -70,24 +79,24 @@ def gather_context(first, places, squared, queries, targets, xyz, probabilities,
                 probabilities[kind],
                 probabilities[1 - kind],
                 slot,
-                lines,
-                feet,
+                near_lines,
+                near_feet,
                 features[kind, row],
             )
 
 
 @kernel
 def _describe(places, away, spacing, probability, other, slot, lines, feet, out):
-    """Describe the probabilities of one kind of edge around a point."""
+    """Describe the probabilities of one kind of edge around a point, by the lines and feet (k, 3) of its neighbours."""
     out[:] = 0.0
-    own, s = probability[places[0]], slot[places[0]]
+    own, placed = probability[places[0]], slot[places[0]] >= 0
     tx, ty, tz, line_like = _main_direction(places, away, probability)
-    agree = abs(lines[s, 0] * tx + lines[s, 1] * ty + lines[s, 2] * tz) if s >= 0 else 0.0
+    agree = abs(lines[0, 0] * tx + lines[0, 1] * ty + lines[0, 2] * tz) if placed else 0.0
     out[OWN], out[ALIGNMENT], out[AGREEMENT] = own, line_like, agree
     _sums(places, probability, other, out)
     _along_and_across(places, away, probability, tx, ty, tz, own, out)
-    if s >= 0:
-        _along_and_across_line(places, away, probability, slot, lines, feet, s, spacing, out)
+    if placed:
+        _along_and_across_line(places, away, probability, slot, lines, feet, spacing, out)
 
 
 @kernel
@@ -158,26 +167,25 @@ def _along_and_across(places, away, probability, tx, ty, tz, own, out):
 
 
 @kernel
-def _along_and_across_line(places, away, probability, slot, lines, feet, s, spacing, out):
+def _along_and_across_line(places, away, probability, slot, lines, feet, spacing, out):
     """The same by the point's own line, and what those beside it that see the same line make of it."""
-    tx, ty, tz = lines[s, 0], lines[s, 1], lines[s, 2]
-    fx, fy, fz = feet[s, 0] / spacing, feet[s, 1] / spacing, feet[s, 2] / spacing
+    tx, ty, tz = lines[0, 0], lines[0, 1], lines[0, 2]
+    fx, fy, fz = feet[0, 0] / spacing, feet[0, 1] / spacing, feet[0, 2] / spacing
     own_away = math.sqrt(fx * fx + fy * fy + fz * fz)
     ahead, behind, rivals, nearer = 0.0, 0.0, 0.0, -2.0
     for i in range(1, len(places)):
         x, y, z = away[0, i], away[1, i], away[2, i]
         far = math.sqrt(x * x + y * y + z * z)
-        j = slot[places[i]]
-        if far > _FAR or far == 0.0 or j < 0:
+        if far > _FAR or far == 0.0 or slot[places[i]] < 0:
             continue
         cosine = (x * tx + y * ty + z * tz) / far
-        p = probability[places[i]] * abs(tx * lines[j, 0] + ty * lines[j, 1] + tz * lines[j, 2])
+        p = probability[places[i]] * abs(tx * lines[i, 0] + ty * lines[i, 1] + tz * lines[i, 2])
         if cosine > _AHEAD:
             ahead = max(ahead, p)
         elif cosine < -_AHEAD:
             behind = max(behind, p)
         elif abs(cosine) < _ASIDE:
-            gx, gy, gz = feet[j, 0] / spacing, feet[j, 1] / spacing, feet[j, 2] / spacing
+            gx, gy, gz = feet[i, 0] / spacing, feet[i, 1] / spacing, feet[i, 2] / spacing
             dx, dy, dz = x + gx - fx, y + gy - fy, z + gz - fz
             along = dx * tx + dy * ty + dz * tz
             apart = math.sqrt(max(dx * dx + dy * dy + dz * dz - along * along, 0.0))

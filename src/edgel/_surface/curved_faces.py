@@ -13,9 +13,9 @@ import numpy as np
 
 from edgel._kernels.cholesky import explain, factorize, solve, variance_of
 from edgel._kernels.parallel import kernel, summing_kernel
+from edgel._neighbors.neighborhood import relative
 from edgel._neighbors.spacing import disc_spacing
 from edgel._surface import hinge
-from edgel._surface.neighborhood import relative
 
 COUNTS, SMALLER = (24, 48, 96), (12, 8)
 """Neighbours of the fits: the first tells both faces' twelve unknowns and the noise, others are tried while surer."""
@@ -58,10 +58,12 @@ def fit_curved_faces(first, places, squared, queries, targets, xyz, fits, max_aw
     scratch = make_scratch()
     for q in range(places.shape[0]):
         best, spacing = edges[targets[first + q]], disc_spacing(squared[q])
+        if queries.shape[0] > 3:  # chosen in a stretched space, but fitted as they lie
+            spacing /= math.sqrt(1.0 + math.sqrt((queries[3:, first + q] ** 2).sum()))
         if not spacing > 0.0:
             outside(fits[targets[first + q]], 1.0, best)
             continue
-        relative(places[q], queries, first + q, xyz, vectors)
+        relative(places[q], queries[:3], first + q, xyz, vectors)
         vectors /= spacing
         outside(fits[targets[first + q]], spacing, start)
         best[:] = start

@@ -19,6 +19,7 @@ from edgel._surface.two_planes import FITS
 
 MAX_AWAY = 1.5  # spacings: a line farther from the point is not its edge
 MIN_TURN = math.radians(12.0)  # of two planes that make an edge
+_MOST = 0.7  # of the turn that any neighbourhood shows
 _FLOOR = 0.02  # spacings: residuals below it do not make one fit better than another
 _COS_MIN = math.cos(math.radians(20.0))  # of two planes through a point, whose angle is at least this
 
@@ -63,7 +64,7 @@ def gather_evidence(index: NeighborIndex, screening: Screening, places: np.ndarr
     if len(places):
         visit_neighbors(
             gather.gather_evidence,
-            at_places(index, places),
+            at_places(index, places, stretch=screening.stretch),
             index,
             min(FITS[-1][0], len(index)),
             screening.normals,
@@ -96,8 +97,24 @@ def _best_fit(features: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return best, np.isfinite(error[np.arange(len(error)), best])
 
 
+def support(evidence: Evidence) -> np.ndarray:
+    """Return the least number of neighbours, of those of `FITS`, that show most of each edge's turn, (M,) int64.
+
+    Sharp edges show it to the few nearest; one that is rounded only to as many as reach over its bend.
+    """
+    fits = evidence.features[:, POINT.block("two_planes")].reshape(-1, len(FITS), two_planes.NUM_FEATURES)
+    turn = np.where(fits[:, :, two_planes.FOOT_AWAY] <= MAX_AWAY, fits[:, :, two_planes.TURN], 0.0)
+    shown = turn >= _MOST * turn.max(axis=1, keepdims=True)
+    return np.array([count for count, _ in FITS])[shown.argmax(axis=1)]
+
+
 def with_context(
-    index: NeighborIndex, places: np.ndarray, evidence: Evidence, crease: np.ndarray, outline: np.ndarray
+    index: NeighborIndex,
+    places: np.ndarray,
+    evidence: Evidence,
+    crease: np.ndarray,
+    outline: np.ndarray,
+    stretch: np.ndarray | None = None,
 ) -> np.ndarray:
     """Add to the evidence of some points how likely their neighbours are edge points.
 
@@ -109,6 +126,8 @@ def with_context(
     evidence : Evidence
     crease, outline : (M,) float64
         Probabilities by the evidence alone; at all other points they are 0.
+    stretch : (3, N) float64 or None
+        Of each place on scan lines: see `edgel._neighbors.scan_lines`.
 
     Returns
     -------
@@ -124,5 +143,6 @@ def with_context(
     if len(places):
         k = min(context.NEIGHBORS + 1, len(index))
         arguments = (probability, slot, lines, feet, around)
-        visit_neighbors(context.gather_context, at_places(index, places), index, k, *arguments)
+        asked = at_places(index, places, stretch=stretch)
+        visit_neighbors(context.gather_context, asked, index, k, *arguments)
     return np.concatenate([evidence.features, *around], axis=1)

@@ -6,13 +6,17 @@ import numpy as np
 
 from edgel._faces import Faces, facing
 from edgel._neighbors.kdtree import NeighborIndex
-from edgel._neighbors.knn import visit_neighbors
+from edgel._neighbors.knn import knn, visit_neighbors
 from edgel._neighbors.normals import Normals
 from edgel._neighbors.queries import at_points
 from edgel._surface import rims
 from edgel._surface.classify import Classification
 from edgel._surface.curved_faces import COUNTS, EDGE, FIRST, LINE, POSITION, SECOND, STD, fit_curved_faces
-from edgel._surface.evidence import MAX_AWAY, MIN_TURN
+from edgel._surface.evidence import MAX_AWAY, MIN_TURN, support
+
+DISC = 16  # neighbours whose disc tells the density
+
+ALIKE = 2.75  # deviations of edges between faces of smoothed points over what independent errors would leave: measured
 
 
 def localize(
@@ -25,6 +29,7 @@ def localize(
     ends: np.ndarray,
     outermost: np.ndarray,
     viewpoint: np.ndarray | None,
+    stretch: np.ndarray | None,
 ) -> Faces:
     """Say where exactly the edge runs at each edge point, and how the surface lies on either side.
 
@@ -46,6 +51,8 @@ def localize(
         The points that surely are where it ends, whatever edge points are asked for.
     viewpoint : (3,) float64 or None
         Normals are turned towards it, or upwards (+Z) without one.
+    stretch : (3, N) float64 or None
+        Of each place of `smoothed` on scan lines: see `edgel._neighbors.scan_lines`.
 
     Returns
     -------
@@ -55,19 +62,37 @@ def localize(
     faces = Faces.of_points(index.at(index.places_of(edge)), planes.normals)
     noise = np.sqrt(planes.residual / max(num_neighbors - 3, 1))
     _put_rims(faces, index, edge, planes, noise, ends, outermost)
-    found = crease_faces(refined(smoothed, creases), smoothed.at(smoothed.places_of(creases.points)), viewpoint)
+    found = crease_faces(
+        refined(index, smoothed, creases, stretch), smoothed.at(smoothed.places_of(creases.points)), viewpoint
+    )
     known = creases.evidence.placed & (found.convex != 0)
-    faces.put(np.searchsorted(edge, creases.points[known]), found, known)
+    rows = np.searchsorted(edge, creases.points[known])
+    faces.put(rows, found, known)
+    # Radii by the density around the point, as the disc of its 16 nearest has it: 16 tell where a surface ends.
+    count = np.full(len(edge), DISC)
+    count[rows] = support(creases.evidence.take(known))
+    disc = knn(index, at_points(index, edge), min(DISC, len(index))).distances[:, -1]
+    faces.scale[:] = disc * np.sqrt(count / DISC)
     return faces
 
 
-def refined(index: NeighborIndex, creases: Classification) -> np.ndarray:
-    """Fit curved faces to the neighbours of creases, from their best fit of two planes: see `fit_curved_faces`."""
-    edges = np.empty((len(creases.points), EDGE))
+def refined(
+    index: NeighborIndex, smoothed: NeighborIndex, creases: Classification, stretch: np.ndarray | None = None
+) -> np.ndarray:
+    """Fit curved faces to the neighbours of creases, from their best fit of two planes: see `fit_curved_faces`.
+
+    Those of the cloud as it was measured: errors of smoothed neighbours are alike, so that fits are too sure. Where
+    these alone make an edge, its deviation is `ALIKE` times what its residuals say.
+    """
+    edges, again = np.empty((2, len(creases.points), EDGE))
     if len(edges):
-        k = min(COUNTS[-1], len(index))
-        arguments = (creases.evidence.fit.astype(np.float64), MAX_AWAY, MIN_TURN, edges)
-        visit_neighbors(fit_curved_faces, at_points(index, creases.points), index, k, *arguments)
+        k, asked = min(COUNTS[-1], len(index)), at_points(smoothed, creases.points, stretch)
+        fits = creases.evidence.fit.astype(np.float64)
+        visit_neighbors(fit_curved_faces, asked, index, k, fits, MAX_AWAY, MIN_TURN, edges)
+        if smoothed is not index:
+            visit_neighbors(fit_curved_faces, asked, smoothed, k, fits, MAX_AWAY, MIN_TURN, again)
+            again[:, STD] *= ALIKE
+            edges = np.where(np.isnan(edges[:, STD:]), again, edges)
     return edges
 
 
@@ -84,6 +109,7 @@ def crease_faces(edges: np.ndarray, xyz: np.ndarray, viewpoint: np.ndarray | Non
     return Faces(
         position=xyz + foot * unknown,
         position_std=edges[:, STD] * unknown[:, 0],
+        scale=np.full(len(xyz), np.nan),
         direction=line * unknown,
         normals=normals * unknown[:, None],
         angle=turn * unknown[:, 0],

@@ -7,11 +7,12 @@ import numpy as np
 from edgel._kernels.parallel import kernel
 from edgel._kernels.rows import aligned
 from edgel._kernels.simd import LANES
+from edgel._neighbors.neighborhood import relative, stretch_normal, unstretch_normal
 from edgel._neighbors.spacing import disc_spacing
 from edgel._surface import hinge, minimal_planes, plane_scales, sectors, two_planes
 from edgel._surface.forest import IN_STEP, add_up, logistic
+from edgel._surface.hinge import unstretch_hinge
 from edgel._surface.minimal_planes import planes_through, span_planes
-from edgel._surface.neighborhood import relative
 from edgel._surface.plane_scales import fit_scales
 from edgel._surface.sectors import sector_gaps
 from edgel._surface.two_planes import fit_two_planes
@@ -42,6 +43,9 @@ def screen(
             q = begin + i
             relative(places[q], queries, first + q, xyz, vectors)
             fit_scales(vectors, squared[q], scales, fitted, found)
+            if queries.shape[0] > 3:
+                for s in range(len(scales)):
+                    unstretch_normal(queries[3:, first + q], fitted[s], 0)
             normals[targets[first + q]] = fitted
             features[i, :cheap] = found
         add_up(features[:count], trees, totals)
@@ -65,6 +69,7 @@ def gather_evidence(
     score, of_votes = np.empty(minimal_planes.PLANES, np.float32), np.empty(minimal_planes.NUM_FEATURES)
     gaps, angles = np.zeros(2 * len(counts)), np.empty(k)
     begins, ends = np.empty(sectors.BINS), np.empty(sectors.BINS)
+    frames = np.empty((len(scales), 4), np.float32)
     _fit_all(first, places, squared, queries, targets, xyz, normals, fits, cheap + len(cloud), out, planes)
     for q in range(places.shape[0]):
         row, own = targets[first + q], places[q, 0]
@@ -81,7 +86,11 @@ def gather_evidence(
             planes_through(vectors, int(votes[j, 0]), spacing, votes[j, 1], cos_min, spanned, off, score, of_votes)
             features[at : at + len(of_votes)] = of_votes
             at += len(of_votes)
-        sector_gaps(vectors, squared[q], normals[own], counts, angles, begins, ends, gaps)
+        frames[:] = normals[own]
+        if queries.shape[0] > 3:
+            for s in range(len(scales)):
+                stretch_normal(queries[3:, first + q], frames[s], 0)
+        sector_gaps(vectors, squared[q], frames, counts, angles, begins, ends, gaps)
         features[at : at + len(gaps)] = gaps
 
 
@@ -90,24 +99,28 @@ def _fit_all(first, places, squared, queries, targets, xyz, normals, fits, begin
     """Fit two planes at each scale, to eight points in step: features into the columns of `out` from `begin` on."""
     num, k = places.shape
     vectors, around = aligned(3 * k * LANES).reshape(3, -1), aligned(4 * k * LANES).reshape(4, -1)
+    stretched, away, plane = queries.shape[0] > 3, np.empty((3, k)), np.empty(4)
     features, hinges = aligned(two_planes.NUM_FEATURES * LANES), aligned(hinge.HINGE * LANES)
     scratch, spacings, own = two_planes.make_scratch(), np.empty(LANES), np.empty(LANES, np.int64)
     for q in range(0, num, LANES):
         for lane in range(LANES):
             own[lane] = min(q + lane, num - 1)  # the last one stands in for those that are missing
             spacings[lane] = disc_spacing(squared[own[lane]])
-            for axis in range(3):
-                for i in range(k):
-                    place = places[own[lane], i]
-                    vectors[axis, i * LANES + lane] = xyz[axis, place] - queries[axis, first + own[lane]]
+            relative(places[own[lane]], queries, first + own[lane], xyz, away)
+            vectors[:, lane::LANES] = away
         for f in range(len(fits)):
             count, scale = min(fits[f, 0], k), fits[f, 1]
             for lane in range(LANES):
                 for i in range(count):
+                    plane[:] = normals[places[own[lane], i], scale]
+                    if stretched:
+                        stretch_normal(queries[3:, first + own[lane]], plane, 0)
                     for axis in range(4):
-                        around[axis, i * LANES + lane] = normals[places[own[lane], i], scale, axis]
+                        around[axis, i * LANES + lane] = plane[axis]
             fit_two_planes(vectors, around, count, spacings, scratch, features, hinges)
             for lane in range(min(LANES, num - q)):
                 row, at = targets[first + q + lane], begin + f * two_planes.NUM_FEATURES
                 out[row, at : at + two_planes.NUM_FEATURES] = features[lane::LANES]
                 planes[row, f] = hinges[lane::LANES]
+                if stretched:
+                    unstretch_hinge(queries[3:, first + q + lane], planes[row, f])

@@ -11,6 +11,7 @@ from edgel._kernels.moments import add_moments_of_eight, planes_of_moments
 from edgel._kernels.parallel import kernel
 from edgel._kernels.rows import keep_rows, load_row, load_three, store_row, store_rows
 from edgel._kernels.simd import LANES, bits, root, spread, where
+from edgel._neighbors.neighborhood import drop_foot, unstretch, unstretch_direction, unstretch_normal
 
 ROUNDS = 3
 
@@ -88,3 +89,17 @@ def refine(vectors, count, whole, start, scratch, hinge, best):
         active = active & (left <= 0.999 * before)  # else it has settled
         if bits(active) == 0:
             break
+
+
+@kernel
+def unstretch_hinge(own, fit):
+    """Take a hinge (24,) back from the space that the stretch `own` (3,) makes."""
+    for normal in (FIRST_NORMAL, SECOND_NORMAL):
+        unstretch_normal(own, fit, normal)
+    for place in (FOOT, FIRST_CENTROID, SECOND_CENTROID):
+        unstretch(own, fit, place)
+    unstretch_direction(own, fit, LINE)
+    drop_foot(fit, FOOT, fit, LINE)
+    length = unstretch_normal(own, fit, PARTING)
+    if length > 0.0:
+        fit[PARTING_LEVEL] /= length

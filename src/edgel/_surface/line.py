@@ -10,6 +10,7 @@ from edgel._kernels.union_find import keep_linked
 from edgel._neighbors.kdtree import NeighborIndex
 from edgel._neighbors.knn import knn
 from edgel._neighbors.queries import at_points
+from edgel.edges import EdgeKind
 
 EVEN = (0.2, 0.5)  # probability that is as likely as not an edge's: least, on the vaguest cloud, and most
 SURE = 0.44  # where it lies on a cloud whose edges are plain; above it a point needs no other
@@ -33,6 +34,31 @@ class Strengths:
     points: np.ndarray
     crease: np.ndarray
     outline: np.ndarray
+
+    @property
+    def strongest(self) -> np.ndarray:
+        """Strength (M,) of the more marked of both."""
+        return np.maximum(self.crease, self.outline)
+
+    def kinds(self, least: float) -> np.ndarray:
+        """Return the kinds (M,) uint8 of at least some strength."""
+        kinds = np.where(self.crease >= least, EdgeKind.CREASE, 0) | np.where(
+            self.outline >= least, EdgeKind.BOUNDARY, 0
+        )
+        return kinds.astype(np.uint8)
+
+    def take(self, some: np.ndarray) -> Strengths:
+        """Return the strengths at some of these points."""
+        return Strengths(self.points[some], self.crease[some], self.outline[some])
+
+    def join(self, other: Strengths) -> Strengths:
+        """Put those of other points in between; where both have a point, the larger ones count."""
+        points = np.union1d(self.points, other.points)
+        both = np.zeros((2, len(points)))
+        for part in (self, other):
+            rows = np.searchsorted(points, part.points)
+            both[:, rows] = np.maximum(both[:, rows], (part.crease, part.outline))
+        return Strengths(points, *both)
 
 
 def strengths(index: NeighborIndex, points: np.ndarray, probability: np.ndarray) -> np.ndarray:

@@ -9,8 +9,8 @@ import numpy as np
 from edgel._kernels.eigen import smallest_eigenpair
 from edgel._kernels.moments import add_moments
 from edgel._kernels.parallel import kernel
+from edgel._neighbors.neighborhood import relative
 from edgel._neighbors.spacing import disc_spacing
-from edgel._surface.neighborhood import relative
 
 SCALES = (8, 16, 32)  # neighbours of the plane fits, the point among them
 

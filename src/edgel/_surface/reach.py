@@ -8,6 +8,7 @@ from edgel._kernels.parallel import kernel
 from edgel._neighbors.kdtree import NeighborIndex, build_index
 from edgel._neighbors.knn import knn, visit_neighbors
 from edgel._neighbors.queries import at_places
+from edgel._neighbors.scan_lines import stretch_reach
 from edgel._surface.context import NEIGHBORS
 from edgel._surface.leaves import Leaves
 from edgel._surface.plane_scales import SCALES
@@ -17,26 +18,31 @@ _USUAL = 1.5  # times the median reach of leaves, within which most lie
 _BLOCK = 65_536  # places whose leaves' centroids exist at a time
 
 
-def evidence_reach(index: NeighborIndex, leaves: Leaves, places: np.ndarray) -> np.ndarray:
+def evidence_reach(
+    index: NeighborIndex, leaves: Leaves, places: np.ndarray, stretch: np.ndarray | None = None
+) -> np.ndarray:
     """Bound how far the evidence at some places (M,), ascending, and of their context reaches, (M,) float64.
 
     What lies in no top cell of the leaves' octree that a ball of this radius touches changes no probability of
     `classify`, given the cloud's statistics: a point hears of the probabilities of its nearest, each of which has two
     planes fitted to its own, which start from the planes of theirs or of the leaves they lie in (`screening_reach`). Of
-    the index that is classified, smoothed or not.
+    the index that is classified, smoothed or not. Takes its stretch (3, N) on scan lines, where it has one: each of
+    these hears of others, too.
     """
     farthest = screening_reach(index, leaves)
+    of_stretch = np.zeros(len(index)) if stretch is None else stretch_reach(index)
     chain = (NEIGHBORS + 1, FITS[-1][0], SCALES[-1])
     asked = [places]
     for count in chain[:-1]:
         near = np.zeros(len(index), np.bool_)
         k = min(count, len(index))
-        visit_neighbors(_mark, at_places(index, asked[-1]), index, k, near)
+        visit_neighbors(_mark, at_places(index, asked[-1], stretch=stretch), index, k, near)
         asked.append(np.flatnonzero(near))
     for count, some in zip(reversed(chain), reversed(asked), strict=True):
         visit = _or_radius if count == SCALES[-1] else _and_farthest
         result = np.zeros(len(index))
-        visit_neighbors(visit, at_places(index, some, some), index, min(count, len(index)), farthest, result)
+        queries = at_places(index, some, some, stretch)  # no point lies farther than it does stretched
+        visit_neighbors(visit, queries, index, min(count, len(index)), farthest, of_stretch, result)
         farthest = result if count <= len(index) else np.full(len(index), np.inf)
     return farthest[places]
 
@@ -98,15 +104,16 @@ def _mark(first, places, squared, queries, targets, xyz, near):
 
 
 @kernel
-def _or_radius(first, places, squared, queries, targets, xyz, own, result):
+def _or_radius(first, places, squared, queries, targets, xyz, own, least, result):
     for q in range(places.shape[0]):
-        result[targets[first + q]] = max(own[targets[first + q]], np.sqrt(squared[q, places.shape[1] - 1]))
+        row, radius = targets[first + q], np.sqrt(squared[q, places.shape[1] - 1])
+        result[row] = max(own[row], least[row], radius)
 
 
 @kernel
-def _and_farthest(first, places, squared, queries, targets, xyz, theirs, result):
+def _and_farthest(first, places, squared, queries, targets, xyz, theirs, least, result):
     for q in range(places.shape[0]):
-        farthest = 0.0
+        row, farthest = targets[first + q], 0.0
         for i in range(places.shape[1]):
             farthest = max(farthest, theirs[places[q, i]])
-        result[targets[first + q]] = np.sqrt(squared[q, places.shape[1] - 1]) + farthest
+        result[row] = max(least[row], np.sqrt(squared[q, places.shape[1] - 1])) + farthest

@@ -10,9 +10,9 @@ from edgel._kernels.cholesky import explain, factorize, solve, variance_of
 from edgel._kernels.parallel import kernel
 from edgel._neighbors.kdtree import NeighborIndex, build_index
 from edgel._neighbors.knn import visit_neighbors
+from edgel._neighbors.neighborhood import relative
 from edgel._neighbors.queries import anywhere, at_points
 from edgel._neighbors.spacing import disc_spacing
-from edgel._surface.neighborhood import relative
 
 AROUND = 16  # neighbours whose middle says on which side the surface lies
 COUNTS = (7, 17)  # outermost points of each fit; that which is surest of its position is taken
@@ -23,6 +23,7 @@ _TERMS = 3  # 1, s along the rim, s^2 / 2
 _CURVATURE = 0.3  # of a rim, in 1 / spacing: standard deviation of what is expected of all
 _FLOOR = 0.05  # spacings: the outermost points lie no nearer to the rim
 _WEIGHT, _NOISE = 2.0, 0.3  # residuals that are expected, and how many of them that weighs as
+_LIFTED = 0.8  # of noise along the surface, which lifts the outermost points out of it: measured, 0.6 to 1.2
 _DEPTH = 1.25  # of outermost points inside the true end, over their spread: measured on random samples, 0.9 to 1.3
 _ASIDE = 2.0  # spacings from the line: farther ones belong to another rim
 
@@ -148,5 +149,6 @@ def _fit(vectors, normal, outward, scratch, rim):
     rim[LINE] = normal[1] * oz - normal[2] * oy
     rim[LINE + 1] = normal[2] * ox - normal[0] * oz
     rim[LINE + 2] = normal[0] * oy - normal[1] * ox
-    rim[STD] = math.sqrt(sigma * sigma * variance_of(inverse, _TERMS, 0) + 0.4 * left / max(free, 1.0))
+    lifted = (_LIFTED * outward[4]) ** 2
+    rim[STD] = math.sqrt(sigma * sigma * variance_of(inverse, _TERMS, 0) + 0.4 * left / max(free, 1.0) + lifted)
     return True

@@ -35,12 +35,15 @@ class Screening:
         Of the cloud.
     leaves : Leaves
         Of the octree that was looked at first.
+    stretch : (3, N) float64 or None
+        Of each place on scan lines: see `edgel._neighbors.scan_lines`.
     """
 
     normals: np.ndarray
     probability: np.ndarray
     statistics: Statistics
     leaves: Leaves
+    stretch: np.ndarray | None = None
 
     @property
     def candidates(self) -> np.ndarray:
@@ -55,10 +58,15 @@ class Screening:
         return normals
 
 
-def screen(index: NeighborIndex, statistics: Statistics, forests: Mapping[str, Forest] | None = None) -> Screening:
+def screen(
+    index: NeighborIndex,
+    statistics: Statistics,
+    forests: Mapping[str, Forest] | None = None,
+    stretch: np.ndarray | None = None,
+) -> Screening:
     """Gather the cheap evidence of every point that the leaves of an octree do not rule out.
 
-    Takes the forests "leaf" and "screen", by default those of the package.
+    Takes the forests "leaf" and "screen", by default those of the package, and the stretch (3, N) on scan lines.
     """
     trees = load_forests() if forests is None else forests
     leaves, of_cloud = describe_leaves(index, statistics.cell), statistics.features
@@ -69,9 +77,12 @@ def screen(index: NeighborIndex, statistics: Statistics, forests: Mapping[str, F
     leaf = leaves.octree.leaf_of_places()
     normals = np.repeat(leaves.planes[:, None].astype(np.float32), len(SCALES), axis=1)[leaf]
     probability = np.zeros(len(index), np.float32)
-    places = np.flatnonzero(kept[leaf])
+    asked = kept[leaf]
+    if stretch is not None:  # leaves hold points of one line, which say nothing of the surface
+        asked |= stretch.any(axis=0)
+    places = np.flatnonzero(asked)
     if len(places):
         k = min(SCALES[-1], len(index))
         arguments = (np.array(SCALES), of_cloud, trees["screen"].in_step, normals, probability)
-        visit_neighbors(gather.screen, at_places(index, places, places), index, k, *arguments)
-    return Screening(normals, probability, statistics, leaves)
+        visit_neighbors(gather.screen, at_places(index, places, places, stretch), index, k, *arguments)
+    return Screening(normals, probability, statistics, leaves, stretch)

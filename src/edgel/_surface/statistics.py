@@ -54,15 +54,17 @@ class Statistics:
         return float(2.0 ** np.round(np.log2(CELL * self.spacing)))
 
 
-def cloud_statistics(index: NeighborIndex) -> Statistics:
+def cloud_statistics(index: NeighborIndex, stretch: np.ndarray | None = None) -> Statistics:
     """Take quantiles of the cheap evidence over a cloud, at places chosen by their coordinates alone.
+
+    Takes the stretch (3, N) of `edgel._neighbors.scan_lines`, where there is one.
 
     Raises
     ------
     ValueError
         If no neighbourhood spans a plane.
     """
-    return statistics_of(*describe_places(index, index.sampled(SAMPLE)))
+    return statistics_of(*describe_places(index, index.sampled(SAMPLE), stretch))
 
 
 def statistics_of(features: np.ndarray, spacing: np.ndarray) -> Statistics:
@@ -86,9 +88,14 @@ def statistics_of(features: np.ndarray, spacing: np.ndarray) -> Statistics:
     return Statistics(values, float(np.median(spacing[spacing > 0])))
 
 
-def describe_places(index: NeighborIndex, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the cheap evidence (M, `plane_scales.NUM_FEATURES`) float32 at some places (M,), and the spacing (M,)."""
+def describe_places(
+    index: NeighborIndex, places: np.ndarray, stretch: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the cheap evidence (M, `plane_scales.NUM_FEATURES`) float32 at some places (M,), and the spacing (M,).
+
+    Takes the stretch (3, N) of `edgel._neighbors.scan_lines`, where there is one.
+    """
     features, spacing = np.zeros((len(places), plane_scales.NUM_FEATURES), np.float32), np.empty(len(places))
-    k = min(SCALES[-1], len(index))
-    visit_neighbors(describe, at_places(index, places), index, k, np.array(SCALES), features, spacing)
+    k, queries = min(SCALES[-1], len(index)), at_places(index, places, stretch=stretch)
+    visit_neighbors(describe, queries, index, k, np.array(SCALES), features, spacing)
     return features, spacing

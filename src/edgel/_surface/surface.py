@@ -10,12 +10,15 @@ from edgel._faces import Faces
 from edgel._neighbors.kdtree import NeighborIndex, build_index
 from edgel._neighbors.normals import fit_nearest, towards
 from edgel._neighbors.queries import at_points
+from edgel._neighbors.scan_lines import scan_line_stretch
 from edgel._stages import Stages
 from edgel._surface.classify import Classification, classify
+from edgel._surface.coarser import CELL, FAINT, FEWEST, Carried, apart, carry, means_of_cells
 from edgel._surface.faces import localize
 from edgel._surface.line import Strengths, strengths
+from edgel._surface.plane_scales import SCALES
 from edgel._surface.screen import Screening, screen
-from edgel._surface.smoothing import smoothed
+from edgel._surface.smoothing import cloud_spacing, smoothed
 from edgel._surface.statistics import cloud_statistics
 from edgel.edges import OUTLINES, EdgeKind
 
@@ -29,11 +32,13 @@ class Surface:
     ----------
     xyz : (N, 3) float64, finite
     stages : Stages
+    coarsest : bool
+        Whether no coarser look is taken, however noisy the cloud is.
     """
 
-    def __init__(self, xyz: np.ndarray, stages: Stages) -> None:
+    def __init__(self, xyz: np.ndarray, stages: Stages, *, coarsest: bool = False) -> None:
         self.xyz = xyz
-        self._stages = stages
+        self._stages, self._coarsest = stages, coarsest
 
     @cached_property
     def index(self) -> NeighborIndex:
@@ -49,11 +54,18 @@ class Surface:
             return smoothed(index)
 
     @cached_property
-    def screening(self) -> Screening:
-        """Where an edge could be."""
+    def stretch(self) -> np.ndarray | None:
+        """What makes neighbourhoods on scan lines round, (3, N) by place of the smoothed tree; None without lines."""
         index = self.smoothed
         with self._stages("screening"):
-            return screen(index, cloud_statistics(index))
+            return scan_line_stretch(index)
+
+    @cached_property
+    def screening(self) -> Screening:
+        """Where an edge could be."""
+        index, stretch = self.smoothed, self.stretch
+        with self._stages("screening"):
+            return screen(index, cloud_statistics(index, stretch), stretch=stretch)
 
     @property
     def normals(self) -> np.ndarray:
@@ -68,11 +80,42 @@ class Surface:
             return classify(index, screening)
 
     @cached_property
-    def strengths(self) -> Strengths:
-        """How marked the edges are there."""
+    def _own_strengths(self) -> Strengths:
+        """How marked the edges are by their own neighbours."""
         index, found = self.smoothed, self.classified
         with self._stages("classification"):
             return Strengths(found.points, *(strengths(index, found.points, p) for p in (found.crease, found.outline)))
+
+    @property
+    def strengths(self) -> Strengths:
+        """How marked the edges are there."""
+        found = self._own_strengths
+        return found if self._carried is None else found.join(self._carried.strengths)
+
+    @cached_property
+    def _cell(self) -> float:
+        """Side of the cells of the coarser look."""
+        return CELL * cloud_spacing(self.index)
+
+    @cached_property
+    def _coarser(self) -> Surface | None:
+        """The means of cells, where the noise asks for them."""
+        if self._coarsest or self.smoothed is self.index:
+            return None
+        xyz = means_of_cells(self.smoothed, self._cell)
+        return Surface(xyz, self._stages, coarsest=True) if len(xyz) >= FEWEST else None
+
+    @cached_property
+    def _carried(self) -> Carried | None:
+        """What the coarser look shows where this one shows nothing."""
+        if (coarser := self._coarser) is None:
+            return None
+        index, found = self.smoothed, self._own_strengths
+        seen = coarser.strengths
+        seen = seen.take(seen.strongest >= FAINT)
+        faces = coarser.faces(seen.points, seen.kinds(FAINT), SCALES[1], None)
+        with self._stages("coarser look"):
+            return apart(index, self._cell, found, carry(index, self._cell, seen, faces))
 
     def faces(self, edge: np.ndarray, kind: np.ndarray, num_neighbors: int, viewpoint: np.ndarray | None) -> Faces:
         """Say where the edge runs at points (E,), ascending, of kinds (E,), and how the surface lies on either side.
@@ -80,12 +123,27 @@ class Surface:
         Normals are turned towards the viewpoint, or upwards (+Z) without one.
         """
         outermost = self.xyz[self.classified.points[self.classified.outline > SURE]]
-        return locate(self.index, self.smoothed, self.classified, outermost, edge, kind, num_neighbors, viewpoint)
+        of_cloud = (self.index, self.smoothed, self.stretch, self.classified, outermost)
+        faces = locate(*of_cloud, edge, kind, num_neighbors, viewpoint)
+        self._put_carried(faces, edge, num_neighbors, viewpoint)
+        return faces
+
+    def _put_carried(self, faces: Faces, edge: np.ndarray, num_neighbors: int, viewpoint: np.ndarray | None) -> None:
+        """Put what the coarser look says of the edge points that it alone shows."""
+        coarser, carried = self._coarser, self._carried
+        if coarser is None or carried is None:
+            return
+        rows, sources = carried.seen_at(edge, self._own_strengths)
+        asked, of_source = np.unique(sources, return_inverse=True)
+        kinds = coarser.strengths.take(np.searchsorted(coarser.strengths.points, asked)).kinds(FAINT)
+        found = coarser.faces(asked, kinds, num_neighbors, viewpoint)
+        faces.put(rows, found.along(self.xyz[edge[rows]], of_source), slice(None))
 
 
 def locate(
     index: NeighborIndex,
     smoothed: NeighborIndex,
+    stretch: np.ndarray | None,
     classified: Classification,
     outermost: np.ndarray,
     edge: np.ndarray,
@@ -94,8 +152,9 @@ def locate(
     viewpoint: np.ndarray | None,
 ) -> Faces:
     """Say what `Surface.faces` does, of a cloud or a part of it; the surface ends at `outermost` (K, 3)."""
-    planes = fit_nearest(index, at_points(index, edge), num_neighbors)
+    own = stretch if stretch is None else stretch[:, smoothed.places_of(index.order)]
+    planes = fit_nearest(index, at_points(index, edge, own), num_neighbors)
     planes = towards(planes, index.at(index.places_of(edge)), viewpoint)
     creases = classified.take(np.isin(classified.points, edge[(kind & EdgeKind.CREASE) > 0]))
     ends = (kind & OUTLINES) > 0
-    return localize(index, smoothed, edge, planes, num_neighbors, creases, ends, outermost, viewpoint)
+    return localize(index, smoothed, edge, planes, num_neighbors, creases, ends, outermost, viewpoint, stretch)

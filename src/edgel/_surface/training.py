@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from edgel._neighbors.kdtree import NeighborIndex, build_index
+from edgel._neighbors.scan_lines import scan_line_stretch
 from edgel._surface.evidence import Evidence, gather_evidence, with_context
 from edgel._surface.forest import Forest
 from edgel._surface.leaves import describe_leaves
@@ -41,14 +42,15 @@ class ScreeningFeatures:
 def screening_features(xyz: np.ndarray, asked: np.ndarray) -> ScreeningFeatures:
     """Describe all leaves of a cloud (N, 3), and the points asked for, (N,) bool."""
     index = smoothed(build_index(np.ascontiguousarray(xyz)))
-    statistics = cloud_statistics(index)
+    stretch = scan_line_stretch(index)
+    statistics = cloud_statistics(index, stretch)
     values, found = statistics.features, describe_leaves(index, statistics.cell)
     places = np.flatnonzero(asked[index.order])
     leaf = np.empty(len(index), np.int64)
     leaf[index.order] = found.octree.leaf_of_places()
     leaves, features = (
         np.concatenate([part, np.broadcast_to(values, (len(part), len(values)))], axis=1)
-        for part in (found.features, describe_places(index, places)[0])
+        for part in (found.features, describe_places(index, places, stretch)[0])
     )
     return ScreeningFeatures(leaves, leaf, index.order[places], features)
 
@@ -76,7 +78,8 @@ class ScreenedCloud:
 def screen_cloud(xyz: np.ndarray, forests: Mapping[str, Forest]) -> ScreenedCloud:
     """Screen a cloud (N, 3) with the forests "leaf" and "screen"."""
     index = smoothed(build_index(np.ascontiguousarray(xyz)))
-    return ScreenedCloud(index, screen(index, cloud_statistics(index), forests))
+    stretch = scan_line_stretch(index)
+    return ScreenedCloud(index, screen(index, cloud_statistics(index, stretch), forests, stretch))
 
 
 def add_context(
@@ -87,4 +90,4 @@ def add_context(
     Takes the coordinates (N, 3) of the index, smoothed where the cloud was; see `edgel._surface.evidence.with_context`.
     """
     index = build_index(np.ascontiguousarray(xyz))
-    return with_context(index, index.places_of(points), evidence, crease, outline)
+    return with_context(index, index.places_of(points), evidence, crease, outline, scan_line_stretch(index))

@@ -39,7 +39,7 @@ def draw_line(plan: Plan, whole: Whole) -> Line:
     counts, shown = np.zeros((2, 1), np.int64), np.zeros(2, np.int64)
     for tile in range(len(plan.tiles)):
         with plan.load("classify", tile) as found:
-            counts, shown = counts + found["counts"], shown + found["shown"]
+            counts, shown = counts + found["counts"], shown + found["from_above"]
     low, high = plan.bounds
     thin = spreads_thin(high - low, pixel_size(whole.statistics.spacing), plan.num_points)
     sides = whole.from_above and not thin and float(shown[0] / shown[1]) >= SHOWN

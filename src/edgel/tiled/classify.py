@@ -9,14 +9,18 @@ import numpy as np
 from edgel._neighbors.kdtree import NeighborIndex, build_index
 from edgel._range_image import pixel_size, raster, viewer_axes
 from edgel._surface import classify, screen
+from edgel._surface.features import POINT
 from edgel._surface.line import histogram
 from edgel._surface.reach import settled
+from edgel._surface.two_planes import FITS
 from edgel.tiled.box import Box
 from edgel.tiled.measure import Whole
 from edgel.tiled.plan import Plan
 
 HALO = 64.0
 """Spacings around a tile, at first: most points hear of what lies within 60."""
+SHOWN = [POINT.column(f"two_planes_{count}.{name}") for count, _ in FITS for name in ("turn", "foot_away")]
+"""Columns of the evidence that say at which scale an edge shows: all that its place asks of it beside the fit."""
 _GROUP = 256.0  # spacings: points not yet sure that lie within such a square get a window of their own
 
 
@@ -85,6 +89,7 @@ def _classify(plan: Plan, whole: Whole, tile: int) -> dict[str, np.ndarray]:
                 "outline": some.outline,
                 "fit": some.evidence.fit,
                 "placed": some.evidence.placed,
+                "shown": some.evidence.features[:, SHOWN],
             }
         )
         left = np.flatnonzero(own & ~sure)
@@ -93,7 +98,7 @@ def _classify(plan: Plan, whole: Whole, tile: int) -> dict[str, np.ndarray]:
     order = np.argsort(parts["key"])
     parts = {name: values[order] for name, values in parts.items()}
     counts = np.stack([histogram(parts["crease"]), histogram(parts["outline"])])
-    return {**parts, "counts": counts, "shown": shown, "read": np.array(read)}
+    return {**parts, "counts": counts, "from_above": shown, "read": np.array(read)}
 
 
 def statistics_spacing(whole: Whole) -> float:
@@ -109,6 +114,7 @@ def _nothing() -> dict[str, np.ndarray]:
         "outline": np.zeros(0),
         "fit": np.zeros((0, 24), np.float32),
         "placed": np.zeros(0, bool),
+        "shown": np.zeros((0, len(SHOWN)), np.float32),
     }
 
 

@@ -22,7 +22,7 @@ from edgel._surface.surface import SURE, locate
 from edgel.edges import EdgeKind
 from edgel.tiled.box import Box
 from edgel.tiled.chains import KINDS, Known, Line
-from edgel.tiled.classify import HALO, Window, open_window, picture_of
+from edgel.tiled.classify import HALO, SHOWN, Window, open_window, picture_of
 from edgel.tiled.measure import Whole
 from edgel.tiled.plan import Plan
 
@@ -49,9 +49,11 @@ def _label(plan: Plan, whole: Whole, line: Line, tile: int) -> dict[str, np.ndar
             break
         halo *= 2
     index, viewpoint = window.index, _viewpoint(plan)
-    classified = Classification(own.points, own.columns["crease"], own.columns["outline"], _evidence(own))
+    rows = np.flatnonzero(np.isin(own.points, edge))
+    crease, outline = (own.columns[name][rows] for name in KINDS)
+    classified = Classification(own.points[rows], crease, outline, _evidence(own, rows))
     outermost = _outermost(plan, core, index.at(index.places_of(edge)), halo)
-    faces = locate(index, index, classified, outermost, edge, kind[edge], k, viewpoint)
+    faces = locate(index, index, None, classified, outermost, edge, kind[edge], k, viewpoint)
     if viewpoint is None:  # then nobody knows the outside
         faces = replace(faces, convex=np.zeros_like(faces.convex))
     return _result(window.keys[edge], kind[edge], strength[edge], faces, read)
@@ -65,13 +67,15 @@ def _own(plan: Plan, window: Window, tile: int) -> tuple[np.ndarray, np.ndarray,
     """What the tile itself keeps of its points."""
     with plan.load("classify", tile) as found:
         points = np.searchsorted(window.keys, found["key"])
-        columns = {name: found[name] for name in (*KINDS, "fit", "placed")}
+        columns = {name: found[name] for name in (*KINDS, "fit", "placed", "shown")}
     return points, np.full(len(points), tile), np.arange(len(points)), columns
 
 
-def _evidence(known: Known) -> Evidence:
-    features = np.broadcast_to(np.float32(np.nan), (len(known.points), NUM_EVIDENCE))  # asked for no more
-    return Evidence(features, known.columns["fit"], known.columns["placed"])
+def _evidence(known: Known, rows: np.ndarray) -> Evidence:
+    """The evidence of some points, as far as it is kept."""
+    features = np.full((len(rows), NUM_EVIDENCE), np.nan, np.float32)
+    features[:, SHOWN] = known.columns["shown"][rows]
+    return Evidence(features, known.columns["fit"][rows], known.columns["placed"][rows])
 
 
 def _kinds(

@@ -9,8 +9,10 @@ import numpy as np
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import knn
 from edgel._neighbors.queries import at_places
+from edgel._neighbors.scan_lines import AREA, are_lines, on_lines
+from edgel._neighbors.scan_lines import SAMPLE as LINES_SAMPLE
 from edgel._range_image import FEW, direction_that_explains
-from edgel._surface.plane_scales import SCALES
+from edgel._surface.plane_scales import NUM_FEATURES
 from edgel._surface.smoothing import SAMPLE as NOISE_SAMPLE
 from edgel._surface.smoothing import noise_at, noise_of, share_of
 from edgel._surface.statistics import SAMPLE, Statistics, describe_places, statistics_of
@@ -29,17 +31,18 @@ def _measure(plan: Plan, tile: int) -> dict[str, np.ndarray]:
     while True:
         window = plan.window(tile, halo, plan.apart)
         xyz, _ = plan.spool.load(window)
-        empty = {"features": np.zeros((0, 20)), "spacing": np.zeros(0), "noise": np.zeros(0), "few": np.zeros((0, 3))}
+        empty = {name: np.zeros(0) for name in ("spacing", "noise", "lines")}
+        empty |= {"features": np.zeros((0, NUM_FEATURES)), "few": np.zeros((0, 3))}
         if not core.holds(xyz).any():
             return {**empty, "read": np.array(len(xyz))}
         index = build_index(xyz)
         own = core.holds(index.xyz.T)
-        places = (index.sampled(number, total) for number in (SAMPLE, NOISE_SAMPLE, FEW))
-        described, noisy, few = (some[own[some]] for some in places)
-        k, asked = min(SCALES[-1], len(index)), np.union1d(described, noisy)
+        places = (index.sampled(number, total) for number in (SAMPLE, NOISE_SAMPLE, LINES_SAMPLE, FEW))
+        described, noisy, lined, few = (some[own[some]] for some in places)
+        k, asked = min(AREA, len(index)), np.unique(np.concatenate([described, noisy, lined]))
         reach = knn(index, at_places(index, asked), k).distances[:, -1]
         deep = window.depth(index.at(asked))
-        if window.endless or (len(index) >= SCALES[-1] and (reach < deep).all()):
+        if window.endless or (len(index) >= AREA and (reach < deep).all()):
             break
         halo *= 2
     features, spacing = describe_places(index, described)
@@ -47,6 +50,7 @@ def _measure(plan: Plan, tile: int) -> dict[str, np.ndarray]:
         "features": features,
         "spacing": spacing,
         "noise": noise_at(index, noisy),
+        "lines": on_lines(index, lined) if len(index) >= AREA else np.zeros(len(lined), bool),
         "few": index.at(few),
         "read": np.array(len(xyz)),
     }
@@ -76,9 +80,14 @@ def merge_measures(plan: Plan) -> Whole:
         If the cloud is one that only a whole can be seen of: too noisy, or shown best from one side.
     """
     found = [plan.load("measure", tile) for tile in range(len(plan.tiles))]
-    features, spacing, noise, few = (
-        np.concatenate([part[name] for part in found]) for name in ("features", "spacing", "noise", "few")
+    features, spacing, noise, lines, few = (
+        np.concatenate([part[name] for part in found]) for name in ("features", "spacing", "noise", "lines", "few")
     )
+    if plan.num_points >= AREA and are_lines(lines):
+        raise ValueError(
+            "points: they lie on scan lines far apart, whose metric is not known in tiles; run the cloud whole, or thin "
+            "it (edgel.thin) to the distance of the lines"
+        )
     if share_of(noise_of(noise)) > 0:
         raise ValueError(
             f"points: noise of {noise_of(noise):.2f} spacings off the surface has to be smoothed away first, which is "

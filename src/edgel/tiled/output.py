@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from edgel._faces import Faces
 from edgel._neighbors.normals import SENSOR, UNKNOWN
 from edgel.edges import Edges
 from edgel.io import read, write
@@ -16,7 +17,7 @@ from edgel.tiled.box import Box
 from edgel.tiled.plan import Plan
 from edgel.tiled.spool import ROWS, Part
 
-_FIELDS = ("kind", "strength", "position", "position_std", "direction", "normals", "angle", "convex")
+_FIELDS = ("kind", "strength", *Faces.__dataclass_fields__)
 
 
 def edges_of(plan: Plan, part: Part) -> Edges:
