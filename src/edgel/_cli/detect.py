@@ -207,7 +207,7 @@ def detect(
             return
         tiling.check_unused()
         reading = files.Reading(intrinsics, columns, sample_mesh)
-        wanted = _Wanted(reading, where and Where(where), method, given, min_angle, crop, label_all)
+        wanted = _Wanted(reading, None if where is None else Where(where), method, given, min_angle, crop, label_all)
         extension = options.extension(output_format)
         todo = jobs.plan(sources, reading, output=output, extension=extension, report=report, clobber=clobber)
         run_jobs(todo, partial(_detect, wanted), talk, workers=workers)

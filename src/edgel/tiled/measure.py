@@ -85,7 +85,7 @@ def merge_measures(plan: Plan) -> Whole:
     )
     if plan.num_points >= AREA and are_lines(lines):
         raise ValueError(
-            "points: they lie on scan lines far apart, whose metric is not known in tiles; run the cloud whole, or thin "
+            "points: they lie on scan lines far apart, whose metric is not known in tiles; run it whole, or thin "
             "it (edgel.thin) to the distance of the lines"
         )
     if share_of(noise_of(noise)) > 0:
