@@ -448,3 +448,26 @@ def back_project(depth, scale, fx, fy, cx, cy):
             if 0 < z < math.inf:
                 xyz[row, col] = (col - cx) / fx * z, (row - cy) / fy * z, z
     return xyz
+
+
+def octree_leaves(points, size, most, fewest, levels):
+    """Sets of points (rows) that lie in the same leaf: cells of a grid, cut in eight while too full."""
+
+    def cut(rows, size, level):
+        if len(rows) <= most or level == levels:
+            return [rows]
+        parts = {}
+        for row in rows:
+            parts.setdefault(tuple(math.floor(c / (size / 2)) for c in points[row]), []).append(row)
+        small = [key for key in sorted(parts) if len(parts[key]) <= most]
+        if small:
+            largest = max(small, key=lambda key: len(parts[key]))  # of several the first
+            for key in [k for k in small if len(parts[k]) < fewest and k != largest]:
+                parts[largest] += parts.pop(key)
+            return [parts.pop(largest)] + [leaf for rows in parts.values() for leaf in cut(rows, size / 2, level + 1)]
+        return [leaf for rows in parts.values() for leaf in cut(rows, size / 2, level + 1)]
+
+    cells = {}
+    for row, point in enumerate(points):
+        cells.setdefault(tuple(math.floor(c / size) for c in point), []).append(row)
+    return {frozenset(leaf) for rows in cells.values() for leaf in cut(rows, size, 0)}

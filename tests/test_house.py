@@ -17,6 +17,7 @@ FLOORS = [
     {"edges", "_kinds", "_faces", "_neighbors", "io"},
     {"_scale", "_surface", "_range_image", "_color", "paper", "plot", "synth", "metrics"},
     {"_labels", "_sides", "_detect", "export"},
+    {"tiled"},
     {"_report"},
     {"_demo", "_viewer"},
     {"_cli"},

@@ -3,7 +3,7 @@
 Run: python training/train.py [--scenes 2000] (15 minutes on two cores; evidence is kept in training/cache). Needs
 `pip install edgel[train]`. Nothing of the benchmark and no real data is seen in training: see `examples.example`.
 
-The trees of both screenings, by leaves of the index and by points, say where an edge could be; the others learn from
+The trees of both screenings, by leaves of an octree and by points, say where an edge could be; the others learn from
 what they let through. The first trees classify each point by its own evidence. What the second ones hear of the
 neighbours' probabilities has to be what the first say of scenes they were not trained on: each half of the scenes is
 classified by trees trained on the other half.
@@ -38,6 +38,7 @@ SCREENING = CACHE / "screening.npz"  # forests of both screenings
 SPREAD = CACHE / "spread.npy"
 KINDS = ("crease", "outline")
 SCREENING_SCENES = 500  # scenes that the trees of the screenings learn from
+TURNS = 3  # ways in which each is turned for the leaves, whose cells lie along the axes
 LOOSE = 0.5  # of the screening's threshold: points that it would nearly let through are gathered in training too
 UNLIKELY = 0.02  # share of all the others
 NEAR, SHARE_NEAR, SHARE_FAR = 3.0, 0.4, 0.15  # of points that are no edge, within so many spacings of one or not
@@ -64,7 +65,7 @@ class Size:
     rate: float = 0.08
 
 
-LEAF, SCREEN = Size(100, 15, 0.25), Size(60, 15, 0.1)
+LEAF, SCREEN = Size(200, 31, 0.15), Size(60, 15, 0.1)
 FIRST = {"crease": Size(160, 31), "outline": Size(100, 31)}
 SECOND = {"crease": Size(300, 63), "outline": Size(150, 63)}
 
@@ -140,15 +141,20 @@ def train_screenings(pool: Pool, scenes: int) -> dict[str, Forest]:
 
 
 def cheap_evidence(seed: int) -> tuple[Table, Table]:
-    """Cheap evidence of some points of a scene, and that of all leaves."""
-    made = example(seed)
+    """Cheap evidence of some points of a scene, and that of all leaves, with the scene turned in some ways."""
+    made, rng = example(seed), np.random.default_rng(seed)
     share = np.where(made.labels.any(axis=1), 1.0, SHARE_FAR)
-    found = screening_features(made.xyz, made.counts & (np.random.default_rng(seed).random(len(share)) < share))
-    inside = np.zeros((len(found.leaves), 2), bool)
-    for kind in range(len(KINDS)):
-        inside[found.leaf[made.labels[:, kind]], kind] = True
-    points = Table(found.features, made.labels[found.points], 1 / share[found.points])
-    return points, Table(found.leaves, inside, np.ones(len(inside)))
+    asked = made.counts & (rng.random(len(share)) < share)
+    turns = [np.eye(3)] + [np.linalg.qr(rng.standard_normal((3, 3)))[0] for _ in range(TURNS - 1)]
+    described = [screening_features(made.xyz @ turn, asked) for turn in turns]
+    tables = []
+    for found in described:
+        inside = np.zeros((len(found.leaves), 2), bool)
+        for kind in range(len(KINDS)):
+            inside[found.leaf[made.labels[:, kind]], kind] = True
+        tables.append(Table(found.leaves, inside, np.ones(len(inside))))
+    found = described[0]
+    return Table(found.features, made.labels[found.points], 1 / share[found.points]), Table.join(tables)
 
 
 def prepare(seed: int) -> Path:

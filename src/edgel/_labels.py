@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from edgel._range_image import SeenEdges, explaining_view, sides
+from edgel._range_image import SeenEdges, explaining_view, pixel_size, sides
 from edgel._surface import Strengths, Surface
 from edgel.edges import EdgeKind
 
@@ -52,7 +52,9 @@ def label_edges(xyz: np.ndarray, found: Strengths | None, seen: SeenEdges | None
         labels.add(seen.points, seen.kind, seen.strength)
     elif found is not None:
         direction = None if surface is None else explaining_view(surface.index)
-        kind = EdgeKind.BOUNDARY if direction is None else sides(xyz, direction, found.points)
+        kind = EdgeKind.BOUNDARY
+        if surface is not None and direction is not None:
+            kind = sides(xyz, direction, found.points, pixel_size(surface.screening.statistics.spacing))
         labels.add(found.points, kind, found.outline)
     return labels
 

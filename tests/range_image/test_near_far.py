@@ -28,11 +28,11 @@ def test_a_closed_solid_has_none():
     cloud = synth.sample(synth.stepped_block(), spacing=3.0, seed=0).cloud
     kind = edgel.detect(cloud).kind
     assert not (kind & (EdgeKind.OCCLUDING | EdgeKind.OCCLUDED)).any()
-    assert (sides(cloud.xyz, DOWN, np.arange(50)) == EdgeKind.BOUNDARY).all()
+    assert (sides(cloud.xyz, DOWN, np.arange(50), 1.0) == EdgeKind.BOUNDARY).all()
 
 
 def test_steep_slopes_are_no_steps():
     rng = np.random.default_rng(0)
     x, y = rng.uniform(0, 60, (2, 3000))
     slope = np.column_stack([x, y, 1.5 * x])
-    assert (sides(slope, DOWN, np.arange(3000)) == EdgeKind.BOUNDARY).mean() > 0.99
+    assert (sides(slope, DOWN, np.arange(3000), 1.0) == EdgeKind.BOUNDARY).mean() > 0.99

@@ -1,6 +1,5 @@
 """Evidence: each kernel against its slow oracle."""
 
-import itertools
 import math
 
 import naive
@@ -8,7 +7,7 @@ import numpy as np
 import pytest
 
 from edgel._kernels.simd import LANES
-from edgel._neighbors.kdtree import build_index, leaf_starts
+from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.queries import anywhere
 from edgel._surface import context, hinge, leaves, minimal_planes, plane_scales, sectors, two_planes
@@ -196,20 +195,26 @@ def test_context_hears_the_neighbours_along_and_beside_the_edge():
 
 
 def test_leaves_are_described_as_by_numpy():
-    xyz = neighbourhood(np.random.default_rng(1), count=500)
+    xyz = neighbourhood(np.random.default_rng(1), count=1000)
     index = build_index(xyz)
-    found = describe_leaves(index)
+    found = describe_leaves(index, 4.0)
     features, planes, near = found.features, found.planes, found.nearest
-    limits = leaf_starts(index)
-    points = [index.xyz[:, a:b].T for a, b in itertools.pairwise(limits)]
+    points = [index.at(part) for part in np.split(found.octree.places, found.octree.starts[1:-1])]
     middles = np.array([p.mean(axis=0) for p in points])
+    assert found.centroids == pytest.approx(middles, abs=1e-6)
     for leaf in range(len(features)):
-        normal, variation, _ = naive.covariance_plane(points[leaf])
-        assert abs(planes[leaf, :3] @ normal) == pytest.approx(1, abs=1e-7)
-        assert planes[leaf, 3] == pytest.approx(math.exp(-variation / leaves.PLANAR), rel=1e-4)
+        spans = len(points[leaf]) >= leaves.SPANNING
+        if spans:
+            normal, variation, _ = naive.covariance_plane(points[leaf])
+            assert abs(planes[leaf, :3] @ normal) == pytest.approx(1, abs=1e-6)
+        assert planes[leaf, 3] == pytest.approx(math.exp(-variation / leaves.PLANAR) if spans else 0, rel=1e-4)
         nearest = np.argsort(((middles - middles[leaf]) ** 2).sum(axis=1))
         assert near[leaf].tolist() == nearest[: len(near[leaf])].tolist()
+        assert found.radii[leaf] == pytest.approx(np.linalg.norm(middles[near[leaf, -1]] - middles[leaf]), abs=1e-6)
+        assert features[leaf, leaves.COUNT] == len(points[leaf])
         size = math.sqrt(points[leaf].var(axis=0).sum())
+        if size == 0:
+            continue
         for g, count in enumerate(leaves.GROUPS):
             group = np.concatenate([points[i] for i in nearest[:count]])
             normal, variation, _ = naive.covariance_plane(group)
@@ -218,9 +223,8 @@ def test_leaves_are_described_as_by_numpy():
             expected = [math.log(variation + 1e-6), abs(off) / size, math.sqrt(max(aside @ aside - off**2, 0)) / size]
             of_group = features[leaf, len(leaves.OF_GROUP) * g :]
             of_three = of_group[[leaves.VARIATION, leaves.OFF_PLANE, leaves.OFF_CENTRE]]
-            assert of_three == pytest.approx(expected, abs=2e-3)
+            assert of_three == pytest.approx(expected, abs=5e-3)
             assert of_group[leaves.SIZE] == pytest.approx(math.sqrt(group.var(axis=0).sum()) / size, rel=1e-4)
-        assert features[leaf, leaves.COUNT] == len(points[leaf])
 
 
 def test_fits_grow():
@@ -249,7 +253,7 @@ def test_every_column_holds_what_its_name_says():
     places = np.flatnonzero(np.abs(index.xyz[0]) < 1)[::7]
     evidence = gather_evidence(index, screening, places)
     assert evidence.placed.sum() > 3
-    statistics = dict(zip(FEATURES_OF_CLOUD, screening.statistics, strict=True))
+    statistics = dict(zip(FEATURES_OF_CLOUD, screening.statistics.features, strict=True))
     for row, fit, place in zip(evidence.features, evidence.fit.astype(float), places, strict=True):
         near = naive.nearest(points.tolist(), index.at(np.array([place]))[0].tolist(), 96)
         vectors = points[near] - points[near[0]]

@@ -4,39 +4,18 @@ import numpy as np
 import pytest
 
 import edgel
-from edgel import synth
 from edgel._neighbors.kdtree import build_index
 from edgel._surface import classify, cloud_statistics, screen
-from edgel._surface.forest import Forest, load_forests
-from edgel._surface.reach import evidence_reach
-
-ALL_LEAVES = Forest(np.zeros(1, np.int32), np.full(1, -1, np.int16), np.full(1, 9, np.float32), np.zeros(1, np.int32))
+from edgel._surface.leaves import describe_leaves
+from edgel._surface.reach import evidence_reach, screening_reach, settled
 
 
 def probabilities(index, statistics):
     """Crease and outline by point, (N, 2); 0 where no one looked."""
-    found = classify(index, screen(index, statistics, {**load_forests(), "leaf": ALL_LEAVES}))
+    found = classify(index, screen(index, statistics))
     said = np.zeros((len(index), 2))
     said[found.points] = np.column_stack([found.crease, found.outline])
     return said
-
-
-def test_what_is_out_of_reach_changes_nothing():
-    scene = synth.sample(synth.wedge_fan(), pattern="uniform", spacing=1.9, noise=0.1, outliers=0.01, seed=4)
-    xyz = scene.cloud.xyz
-    cut = np.quantile(xyz[:, 0], 0.7)
-    tile = np.ascontiguousarray(xyz[xyz[:, 0] < cut])
-    whole, part = build_index(xyz), build_index(tile)
-    statistics = cloud_statistics(whole)
-    reach = np.empty(len(tile))
-    reach[part.order] = evidence_reach(part)
-    sure = reach < cut - tile[:, 0]  # told by the tile alone
-    assert sure.mean() > 0.4
-    assert np.median(reach) < 25 * scene.spacing
-    expected, said = probabilities(whole, statistics)[xyz[:, 0] < cut], probabilities(part, statistics)
-    np.testing.assert_array_equal(said[sure], expected[sure])
-    assert (said[sure] > 0.5).any()
-    assert (said != expected).any()  # near the cut it is another surface
 
 
 @pytest.fixture(scope="module")
@@ -52,6 +31,38 @@ def houses():
     height = np.where(roof, 9 + np.where(x % 76 < 38, 0, 8 - v) * 0.7, height)
     height += np.where(crown, rng.uniform(3, 9, len(plan)), 0)
     return np.column_stack([plan, height]) + 0.05 * rng.standard_normal((len(plan), 3))
+
+
+def test_what_is_out_of_reach_changes_nothing(houses):
+    xyz = np.concatenate([houses, houses[::500] + [0.3, 0.2, 6.0]])  # some stray points
+    xyz[(xyz[:, 1] > 60) & (xyz[:, 2] < 15), 2] = 0.0  # and a field, which the first look rules out
+    whole = build_index(xyz)
+    statistics = cloud_statistics(whole)
+    cut = 112 // statistics.cell * statistics.cell  # whole cells
+    tile = np.ascontiguousarray(xyz[xyz[:, 0] < cut])
+    part = build_index(tile)
+    expected, said = probabilities(whole, statistics)[xyz[:, 0] < cut], probabilities(part, statistics)
+    leaves = describe_leaves(part, statistics.cell)
+    reach, looked = np.empty((2, len(tile)))
+    everywhere = np.arange(len(part))
+    for radii, result in ((evidence_reach(part, leaves, everywhere), reach), (screening_reach(part, leaves), looked)):
+        result[part.order] = radii
+    sure = reach < cut - tile[:, 0]  # told by the tile alone
+    told = np.empty(len(tile), bool)
+    told[part.order] = settled(part, leaves, cut - part.xyz[0])
+    np.testing.assert_array_equal(told, sure)  # most of them by their leaves
+    assert sure.mean() > 0.3
+    assert np.median(reach) < 60
+    np.testing.assert_array_equal(said[sure], expected[sure])
+    assert (said[sure] > 0.5).any()
+    assert (said != expected).any()  # near the cut it is another surface
+    # The first look alone reaches less far, and so does what it says.
+    ruled_out, of_whole = np.empty(len(tile), bool), np.empty(len(xyz), bool)
+    ruled_out[part.order], of_whole[whole.order] = (screen(i, statistics).probability == 0 for i in (part, whole))
+    sure = looked < cut - tile[:, 0]
+    assert sure.mean() > 0.5
+    assert 0.1 < ruled_out[sure].mean() < 0.9
+    np.testing.assert_array_equal(ruled_out[sure], of_whole[xyz[:, 0] < cut][sure])
 
 
 def test_a_strip_left_out_changes_edges_beside_it_alone(houses):

@@ -67,7 +67,7 @@ def test_statistics_hang_neither_on_the_sample_nor_on_what_is_far():
     half = build_index(near)
     same = {tuple(p) for p in index.at(places)} & {tuple(p) for p in near}
     assert same <= {tuple(p) for p in half.at(half.sampled(5_000))}
-    said = cloud_statistics(index)
+    said = cloud_statistics(index).features
     assert (np.abs(said / STEPS - np.round(said / STEPS)) < 1e-5).all()
     most = index.xyz.T[index.xyz[0] > np.quantile(index.xyz[0], 0.01)]
-    np.testing.assert_array_equal(cloud_statistics(build_index(np.ascontiguousarray(most))), said)
+    np.testing.assert_array_equal(cloud_statistics(build_index(np.ascontiguousarray(most))).features, said)

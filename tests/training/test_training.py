@@ -39,9 +39,9 @@ def test_screening_features_are_in_the_layouts(made):
     assert found.features.shape == (asked.sum(), NUM_SCREEN)
     assert np.array_equal(np.sort(found.points), np.flatnonzero(asked))
     assert found.leaves.shape == (found.leaf.max() + 1, len(LEAF))
-    statistics = cloud_statistics(smoothed(build_index(made.xyz)))
+    values = cloud_statistics(smoothed(build_index(made.xyz))).features
     for rows, layout in ((found.features, POINT), (found.leaves, LEAF)):
-        np.testing.assert_array_equal(rows[:, layout.block("cloud")], np.broadcast_to(statistics, (len(rows), 8)))
+        np.testing.assert_array_equal(rows[:, layout.block("cloud")], np.broadcast_to(values, (len(rows), 8)))
     np.testing.assert_array_equal(np.bincount(found.leaf), found.leaves[:, LEAF.column("leaf.count")])
 
 

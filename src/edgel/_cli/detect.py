@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import edgel
+from edgel._cli import as_one as tiles
 from edgel._cli import files, jobs, options
 from edgel._cli.batch import Talk, run_jobs
 from edgel._cli.errors import ExitCode, Failure, exit_codes
@@ -43,6 +44,7 @@ Examples:
   edgel detect scan.ply -o edges.ply
   edgel detect scan.las -o labelled.laz --all
   edgel detect *.laz -o edges/ --workers 2
+  edgel detect *.laz -o city/ --as-one
   edgel detect scan.las -o roofs.laz --where "classification == 6"
   edgel detect scan.txt --columns _,x,y,z,intensity -o edges.ply
   edgel detect part.stl --sample-mesh 200000 -o edges.ply
@@ -162,6 +164,10 @@ def detect(
     gray_min: Annotated[
         float | None, options.paper_option("gray_min", "Grey of the lowest point, 0 to 255.", "GREY")
     ] = None,
+    as_one: tiles.AsOne = False,
+    tile_points: tiles.TilePoints = None,
+    scheduler: tiles.Scheduler = None,
+    overwrite: tiles.Overwrite = False,
     output_format: options.Format = None,
     clobber: options.Clobber = None,
     as_json: options.AsJson = False,
@@ -193,12 +199,18 @@ def detect(
         if label_all and output is None:
             raise Failure(ExitCode.USAGE, "--all: says what -o writes; add -o OUT")
         files.check_stdout(output, as_json=as_json)
+        talk, tiling = Talk("detect", as_json, quiet, debug), tiles.Tiling(as_one, tile_points, scheduler, overwrite)
+        if as_one:
+            refused = {"intrinsics": intrinsics, "columns": columns, "sample_mesh": sample_mesh, "where": where}
+            refused |= {"all": label_all, "report": report, "min_angle": min_angle, "crop": crop, "clobber": clobber}
+            tiles.detect_as_one(sources, output, output_format, method, given, refused, tiling, talk, workers)
+            return
+        tiling.check_unused()
         reading = files.Reading(intrinsics, columns, sample_mesh)
-        condition = None if where is None else Where(where)
-        wanted = _Wanted(reading, condition, method, given, min_angle, crop, label_all)
+        wanted = _Wanted(reading, None if where is None else Where(where), method, given, min_angle, crop, label_all)
         extension = options.extension(output_format)
         todo = jobs.plan(sources, reading, output=output, extension=extension, report=report, clobber=clobber)
-        run_jobs(todo, partial(_detect, wanted), Talk("detect", as_json, quiet, debug), workers=workers)
+        run_jobs(todo, partial(_detect, wanted), talk, workers=workers)
 
 
 def _check_choice(method: str, min_angle: float | None, crop: Sequence[float] | None) -> None:

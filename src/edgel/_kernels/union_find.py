@@ -31,3 +31,19 @@ def keep_linked(links, strong, kept):
             holds[find_root(parents, row)] = True
     for row in range(len(links)):
         kept[row] = holds[find_root(parents, row)]
+
+
+def join(count: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Number the sets (count,) int64, by their first members, that pairs of members a (M,), b (M,) make."""
+    parents = np.arange(count)
+    _join(a.astype(np.int64), b.astype(np.int64), parents)
+    return np.unique(parents, return_inverse=True)[1]
+
+
+@kernel
+def _join(a, b, parents):
+    for i in range(len(a)):
+        one, other = find_root(parents, a[i]), find_root(parents, b[i])
+        parents[max(one, other)] = min(one, other)
+    for member in range(len(parents)):
+        parents[member] = find_root(parents, member)

@@ -65,12 +65,16 @@ class NeighborIndex:
         xyz[self.order] = self.xyz.T
         return xyz
 
-    def sampled(self, number: int) -> np.ndarray:
-        """Return about `number` places, ascending, by a hash of the coordinates and nothing else."""
-        if len(self) <= number:
+    def sampled(self, number: int, total: int | None = None) -> np.ndarray:
+        """Return about `number` places, ascending, by a hash of the coordinates and nothing else.
+
+        `total` is the number of points of the cloud that these are a part of, by default their own.
+        """
+        total = len(self) if total is None else total
+        if total <= number:
             return np.arange(len(self))
         chosen = np.empty(len(self), np.bool_)
-        below = np.uint64(2**64 * number // len(self))
+        below = np.uint64(2**64 * number // total)
         run_slices(_choose, len(self), self.xyz.view(np.uint64), below, chosen, size=65536)
         return np.flatnonzero(chosen)
 
@@ -168,13 +172,6 @@ def node_start(number, count, nodes):
     Nodes begin at multiples of eight, so that eight points in step share a leaf.
     """
     return min(number * ((count + LANES - 1) // LANES) // nodes * LANES, count)
-
-
-def leaf_starts(index: NeighborIndex) -> np.ndarray:
-    """Return the first place of each leaf, and the number of points after the last, (L + 1,) int64."""
-    leaves = len(index.boxes) // 2
-    blocks = (len(index) + LANES - 1) // LANES
-    return np.minimum(np.arange(leaves + 1) * blocks // leaves * LANES, len(index))
 
 
 @kernel

@@ -88,6 +88,18 @@ def fit_planes(index: NeighborIndex, queries: Queries, num_neighbors: int) -> No
     return _fit(index, queries, min(num_neighbors, len(index)), np.empty(0))
 
 
+def fit_nearest(index: NeighborIndex, queries: Queries, num_neighbors: int) -> Normals:
+    """Fit planes as `fit_planes` does, with sums from the nearest neighbour to the farthest.
+
+    So they are the same to the bit in a part of the cloud that holds these neighbours, whose tree is another.
+    """
+    count = len(queries)
+    planes = Normals(np.empty((count, 3)), np.empty(count), np.empty(count), np.empty(count))
+    results = (planes.normals, planes.offset, planes.residual, planes.variation)
+    visit_neighbors(fit_listed, queries, index, min(num_neighbors, len(index)), *results)
+    return planes
+
+
 def fit_planes_within(index: NeighborIndex, queries: Queries, num_neighbors: int) -> tuple[Normals, np.ndarray]:
     """Fit planes as `fit_planes` does, and say within which distance the neighbours lie.
 

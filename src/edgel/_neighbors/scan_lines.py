@@ -29,7 +29,7 @@ _OPPOSITE = -0.93  # cosine between the ways to them, at most
 _OWN = (1.5, 3.0)  # distances of points, and deviations from the line, within which a point is on it
 _ON_LINES = 1 / 12  # share of the neighbours that have to lie on lines: chance seldom does that
 _CLOUD = 0.2  # share of a cloud's points that have to, or it has no lines
-_SAMPLE = 4_000  # points that tell whether it has
+SAMPLE = 4_000  # points that tell whether it has
 _EVEN = 0.2  # of the most spread there may be on a line: below it one stretch is as straight as the other
 _U, _SPREAD, _RATIO, _OFF, _APART, _REACH, _ACROSS, _LINE = 0, 3, 4, 5, 6, 7, 8, 11
 """Columns of a line: direction, spread over its most, distance of lines over that of points, deviation from it, their
@@ -77,7 +77,17 @@ def stretch_reach(index: NeighborIndex) -> np.ndarray:
 def _has_lines(index: NeighborIndex) -> bool:
     if len(index) < AREA:
         return False
-    return bool(np.mean(_lines(index, index.sampled(_SAMPLE))[:, _SPREAD] < 1.0) >= _CLOUD)
+    return are_lines(on_lines(index, index.sampled(SAMPLE)))
+
+
+def are_lines(on: np.ndarray) -> bool:
+    """Whether a cloud has lines of which so many of the sampled places lie on one, in any order."""
+    return bool(np.mean(on) >= _CLOUD)
+
+
+def on_lines(index: NeighborIndex, places: np.ndarray) -> np.ndarray:
+    """Return whether some places (M,), ascending, lie on straight lines, (M,) bool."""
+    return _lines(index, places)[:, _SPREAD] < 1.0
 
 
 def _lines(index: NeighborIndex, places: np.ndarray) -> np.ndarray:

@@ -19,7 +19,7 @@ _STEPS = 2  # in which the size of a pixel doubles
 _MOST_PIXELS = 50  # for each point
 
 
-def sides(xyz: np.ndarray, direction: np.ndarray, points: np.ndarray) -> np.ndarray:
+def sides(xyz: np.ndarray, direction: np.ndarray, points: np.ndarray, size: float) -> np.ndarray:
     """Tell what lies beside outline points, seen along a direction.
 
     Parameters
@@ -30,6 +30,8 @@ def sides(xyz: np.ndarray, direction: np.ndarray, points: np.ndarray) -> np.ndar
         In which the viewer looks.
     points : (M,) int64
         The outline points.
+    size : float
+        Of a pixel: see `pixel_size`.
 
     Returns
     -------
@@ -42,14 +44,18 @@ def sides(xyz: np.ndarray, direction: np.ndarray, points: np.ndarray) -> np.ndar
     >>> x, y = np.meshgrid(np.arange(30.0), np.arange(20.0))
     >>> stair = np.c_[x.ravel(), y.ravel(), 10.0 * (x.ravel() < 15)]
     >>> middle = np.flatnonzero(y.ravel() == 10)
-    >>> found = sides(stair, np.array([0.0, 0.0, -1.0]), middle[[0, 14, 15, 29]])
+    >>> found = sides(stair, np.array([0.0, 0.0, -1.0]), middle[[0, 14, 15, 29]], 1.0)
     >>> [EdgeKind(int(flag)).name for flag in found]
     ['BOUNDARY', 'OCCLUDING', 'OCCLUDED', 'BOUNDARY']
     """
-    boundary = np.full(len(points), EdgeKind.BOUNDARY, np.uint8)
-    raster = _rastered(xyz, direction)
-    if raster is None or raster.shown < SHOWN:
-        return boundary
+    raster = _rastered(xyz, direction, size)
+    if raster is None or raster.shown.mean() < SHOWN:
+        return np.full(len(points), EdgeKind.BOUNDARY, np.uint8)
+    return sides_in(raster, points)
+
+
+def sides_in(raster: Raster, points: np.ndarray) -> np.ndarray:
+    """Tell what lies beside outline points (M,) in a picture, (M,) uint8: see `sides`."""
     nearest, size = raster.nearest, raster.size
     row, col, own = raster.row[points], raster.col[points], raster.depth[points]
     reach = range(-_REACH, _REACH + 1)
@@ -69,14 +75,16 @@ def sides(xyz: np.ndarray, direction: np.ndarray, points: np.ndarray) -> np.ndar
 def explaining_direction(sample: np.ndarray, directions: list[np.ndarray]) -> np.ndarray | None:
     """Return the first direction that shows nearly all of a sample (M, 3) of a cloud's points, None if none does."""
     for direction in directions:
-        raster = _rastered(sample, direction)
-        if raster is not None and raster.shown >= SHOWN:
+        raster = _rastered(sample, direction, _size_of(sample, direction))
+        if raster is not None and raster.shown.mean() >= SHOWN:
             return direction
     return None
 
 
 @dataclass(frozen=True, eq=False)
-class _Raster:
+class Raster:
+    """Points seen along a direction."""
+
     row: np.ndarray  # (N,) int64, of the pixel of each point
     col: np.ndarray
     depth: np.ndarray  # (N,) float64
@@ -84,24 +92,38 @@ class _Raster:
     size: float  # of a pixel
 
     @property
-    def shown(self) -> float:
-        """Share of the points that lie in the layer nearest to the viewer."""
-        return float(np.mean(self.depth - self.nearest[self.row, self.col] <= DEPTH * self.size))
+    def shown(self) -> np.ndarray:
+        """Whether each point (N,) lies in the layer nearest to the viewer."""
+        return self.depth - self.nearest[self.row, self.col] <= DEPTH * self.size
 
 
-def _rastered(xyz: np.ndarray, direction: np.ndarray) -> _Raster | None:
-    """Project points along a direction, about as many pixels as points where any are; None if they spread too thin.
+def pixel_size(spacing: float) -> float:
+    """Return the size of a pixel for points some spacing apart, in whole steps: what is far away must not matter."""
+    return 2.0 ** (round(_STEPS * np.log2(spacing)) / _STEPS) if spacing > 0 else 0.0
 
-    Pixels have a size in whole steps and fixed corners: what is far away must not matter.
-    """
+
+def _size_of(sample: np.ndarray, direction: np.ndarray) -> float:
+    """Return the size of a pixel that holds one of the points (M, 3) of a sample, where any are."""
+    right, down, _ = viewer_axes(direction, np.array([0.0, 0.0, 1.0]))
+    return pixel_size(float(np.sqrt(covered_area(sample @ np.column_stack([right, down])) / len(sample))))
+
+
+def spreads_thin(extent: np.ndarray, size: float, count: int) -> bool:
+    """Whether a picture of some extent (2,) has too many pixels for so many points."""
+    return not size > 0 or (extent / size + 1).prod() > _MOST_PIXELS * count + 10_000
+
+
+def _rastered(xyz: np.ndarray, direction: np.ndarray, size: float) -> Raster | None:
+    """Project points along a direction; None if they spread too thin."""
     right, down, forward = viewer_axes(direction, np.array([0.0, 0.0, 1.0]))
     picture, depth = xyz @ np.column_stack([right, down]), xyz @ forward
-    size = float(np.sqrt(covered_area(picture) / len(picture)))
-    size = 2.0 ** (round(_STEPS * np.log2(size)) / _STEPS) if size > 0 else 0.0
-    if not size > 0 or (np.ptp(picture, axis=0) / size + 1).prod() > _MOST_PIXELS * len(xyz) + 10_000:
-        return None
+    return None if spreads_thin(np.ptp(picture, axis=0), size, len(xyz)) else raster(picture, depth, size)
+
+
+def raster(picture: np.ndarray, depth: np.ndarray, size: float) -> Raster:
+    """Put points with places (N, 2) in a picture and depths (N,) into its pixels, which have fixed corners."""
     pixel = np.floor(picture / size + 0.5)
     col, row = (pixel - pixel.min(axis=0) + _REACH).astype(np.int64).T
     nearest = np.full((row.max() + 1 + _REACH, col.max() + 1 + _REACH), np.inf)
     np.minimum.at(nearest, (row, col), depth)
-    return _Raster(row, col, depth, nearest, size)
+    return Raster(row, col, depth, nearest, size)

@@ -17,7 +17,7 @@ from edgel.cloud import Cloud, Points
 METHODS = ("auto", "surface", "organized", "orthographic", "pinhole", "spherical")
 
 _SAMPLE = 50_000  # points at which directions are compared, where the best is asked for
-_FEW = 1_500  # and where only near and far sides are to be told apart
+FEW = 1_500  # and where only near and far sides are to be told apart
 _CAMERA = 0.5  # least cosine to the mean ray in the view of a camera
 _DIGITS = 3  # of a cell: grids that fit as well as that are equally good, and the simplest is taken
 
@@ -167,7 +167,12 @@ def choose_view(cloud: Cloud, finite: Points, method: str, viewpoint: np.ndarray
 
 def explaining_view(index: NeighborIndex) -> np.ndarray | None:
     """Return the direction (3,) that shows nearly all of a list of points, None if none does."""
-    sample = index.at(index.evenly_sampled(_FEW))
+    return direction_that_explains(index.at(index.sampled(FEW)))
+
+
+def direction_that_explains(sample: np.ndarray) -> np.ndarray | None:
+    """Return the direction (3,) that shows nearly all of a sample (M, 3) of the points, in any order, None if none."""
+    sample = sample[np.lexsort(sample.T)]
     return explaining_direction(sample, _directions(sample))
 
 

@@ -68,7 +68,7 @@ def gather_evidence(index: NeighborIndex, screening: Screening, places: np.ndarr
             index,
             min(FITS[-1][0], len(index)),
             screening.normals,
-            screening.statistics,
+            screening.statistics.features,
             np.array(SCALES),
             np.array(FITS),
             np.array(minimal_planes.FITS),

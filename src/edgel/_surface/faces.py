@@ -47,7 +47,7 @@ def localize(
         Of those edge points that lie on a crease.
     ends : (E,) bool
         Those where the surface ends.
-    outermost : (K,) int64
+    outermost : (K, 3) float64
         The points that surely are where it ends, whatever edge points are asked for.
     viewpoint : (3,) float64 or None
         Normals are turned towards it, or upwards (+Z) without one.

@@ -1,6 +1,6 @@
 """The features that the trees hear of: their names, columns, meaning and source.
 
-Two layouts. That of the leaves of the k-d tree is what the first screening looks at. That of the points grows from left
+Two layouts. That of the leaves of an octree is what the first screening looks at. That of the points grows from left
 to right: the screening takes its first columns, the first classification more, the second all. The kernels write each
 block by the constants beside its names; `training/train.py` stores the layouts' ids with the weights, and weights made
 for another layout are refused.
@@ -15,7 +15,7 @@ from types import ModuleType
 
 from edgel._surface import context, leaves, minimal_planes, plane_scales, sectors, statistics, two_planes
 
-VERSION = 1
+VERSION = 2
 """To be counted up when a feature keeps its name and changes its meaning."""
 
 

@@ -17,7 +17,8 @@ SURE = 0.44  # where it lies on a cloud whose edges are plain; above it a point 
 STRONG = 0.4  # what a chain of fainter points has to hold
 VAGUE = (0.2, 0.3)  # where it lies in that range, faint points come one abreast the more, the nearer to the end
 _STEP = 0.02  # what it is rounded to: no answer shall hang on what lies far away
-_NEAREST = 9  # points among which the likeliest is looked for, and which link to a chain, the point among them
+BINS = 1 << 16  # values of a probability that are told apart when the line is drawn
+NEAREST = 9  # points among which the likeliest is looked for, and which link to a chain, the point among them
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,34 +69,83 @@ def strengths(index: NeighborIndex, points: np.ndarray, probability: np.ndarray)
     half: by a chain that holds a strong point, and by being the likeliest among its nearest. On the vaguest clouds,
     where no one can say which of the points abreast is the edge's, all of them count.
     """
-    even = even_probability(probability)
+    even = even_probability(histogram(probability))
     if even >= SURE:
         return strength_of(probability, even)
-    strength = strength_of(probability, SURE)
-    on = np.flatnonzero(probability >= even)
-    nearest = knn(index, at_points(index, points[on]), min(_NEAREST, len(index))).points
-    everywhere, row = np.zeros(len(index)), np.full(len(index), -1)
-    everywhere[points], row[points[on]] = probability, np.arange(len(on))
-    chained = np.empty(len(on), np.bool_)
-    keep_linked(row[nearest], probability[on] >= STRONG, chained)
-    share = np.clip((even - VAGUE[0]) / (VAGUE[1] - VAGUE[0]), 0.0, 1.0)
-    likeliest = probability[on] >= everywhere[nearest].max(axis=1)
-    shown = on[chained & (likeliest | (probability[on] >= even + share * (SURE - even)))]
-    strength[shown] = strength_of(probability[shown], even)
-    return strength
+    faint = faint_points(index, points, probability, even)
+    number, chained = np.full(len(probability), -1), np.empty(len(faint.rows), np.bool_)
+    number[faint.rows] = np.arange(len(faint.rows))
+    links = np.where(faint.links >= 0, number[faint.links], -1)
+    keep_linked(links, probability[faint.rows] >= STRONG, chained)
+    return with_faint(probability, even, faint, chained)
 
 
-def even_probability(probability: np.ndarray) -> float:
+def histogram(probability: np.ndarray) -> np.ndarray:
+    """Count probabilities (M,) by their value, (BINS,) int64: counts of the parts of a cloud add up to the whole's."""
+    return np.bincount((probability * BINS).astype(np.int64).clip(0, BINS - 1), minlength=BINS)
+
+
+def even_probability(counts: np.ndarray) -> float:
     """Return the probability that is as likely as not an edge's: half of the greatest expected F1, within `EVEN`.
 
     Lipton et al. 2014, doi:10.1007/978-3-662-44851-9_15: near one half where edges are plain, lower where noise leaves
     none of them sure. Where it would be lower than that there are no edges to speak of, and what is found has to be as
-    sure as elsewhere.
+    sure as elsewhere. Takes the `histogram` of all probabilities.
     """
-    falling = np.sort(probability)[::-1]
-    expected = np.cumsum(falling) / (np.arange(1, len(falling) + 1) + falling.sum())
+    falling = counts[::-1]
+    hits = np.cumsum(falling * ((np.arange(BINS)[::-1] + 0.5) / BINS))
+    expected = hits / np.maximum(np.cumsum(falling) + hits[-1], 1e-300)
     even = round(float(expected.max(initial=0.0)) / _STEP) * _STEP
     return min(even, EVEN[1]) if even >= EVEN[0] else SURE
+
+
+@dataclass(frozen=True, eq=False)
+class Faint:
+    """The points that count if they show that they belong to an edge: those as likely as not, and surer ones.
+
+    Attributes
+    ----------
+    rows : (K,) int64
+        Among the points with a probability, ascending.
+    links : (K, 9) int64
+        The rows of the nearest points of each, itself first; -1 where that is not as likely.
+    nearest : (K, 9) int64
+        The nearest points.
+    likeliest : (K,) bool
+        Whether none of them is likelier.
+    """
+
+    rows: np.ndarray
+    links: np.ndarray
+    nearest: np.ndarray
+    likeliest: np.ndarray
+
+
+def faint_points(
+    index: NeighborIndex, points: np.ndarray, probability: np.ndarray, even: float, own: np.ndarray | None = None
+) -> Faint:
+    """Look at the nearest of those points (M,), ascending, whose probability (M,) is at least `even`.
+
+    Only at those of some rows `own` (K,), ascending, where these are given.
+    """
+    likely = probability >= even
+    on = np.flatnonzero(likely) if own is None else own[likely[own]]
+    nearest = knn(index, at_points(index, points[on]), min(NEAREST, len(index))).points
+    everywhere, row = np.zeros(len(index)), np.full(len(index), -1)
+    everywhere[points], row[points[likely]] = probability, np.flatnonzero(likely)
+    return Faint(on, row[nearest], nearest, probability[on] >= everywhere[nearest].max(axis=1))
+
+
+def with_faint(probability: np.ndarray, even: float, faint: Faint, chained: np.ndarray) -> np.ndarray:
+    """Turn probabilities (M,) into strengths (M,), of the faint points of those that show that they belong to an edge.
+
+    `chained` (K,) bool are the faint points whose chain holds a strong one.
+    """
+    strength, on = strength_of(probability, SURE), faint.rows
+    share = np.clip((even - VAGUE[0]) / (VAGUE[1] - VAGUE[0]), 0.0, 1.0)
+    shown = on[chained & (faint.likeliest | (probability[on] >= even + share * (SURE - even)))]
+    strength[shown] = strength_of(probability[shown], even)
+    return strength
 
 
 def strength_of(probability: np.ndarray, even: float) -> np.ndarray:

@@ -73,10 +73,11 @@ def fit_scales(vectors, squared, scales, normals, features):
 
 
 @kernel
-def describe(first, places, squared, queries, targets, xyz, scales, features):
-    """Write what `fit_scales` says of some points."""
+def describe(first, places, squared, queries, targets, xyz, scales, features, spacing):
+    """Write what `fit_scales` says of some points, and how far apart they lie."""
     vectors, fitted, found = np.empty((3, places.shape[1])), np.zeros((len(scales), 4)), np.zeros(features.shape[1])
     for q in range(places.shape[0]):
         relative(places[q], queries, first + q, xyz, vectors)
         fit_scales(vectors, squared[q], scales, fitted, found)
         features[targets[first + q]] = found
+        spacing[targets[first + q]] = disc_spacing(squared[q])

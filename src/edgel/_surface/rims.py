@@ -38,7 +38,7 @@ def find_rims(
     index : NeighborIndex
     points : (M,) int64
         Ascending.
-    outermost : (K,) int64
+    outermost : (K, 3) float64
         The points that surely are where the surface ends.
     normals : (M, 3) float64
         Of the surface there.
@@ -55,8 +55,7 @@ def find_rims(
     if len(points) and len(outermost) >= COUNTS[0]:
         k = min(AROUND, len(index))
         visit_neighbors(_find_across, at_points(index, points), index, k, normals, noise, across)
-        alone, asked = (index.at(index.places_of(rows)) for rows in (outermost, points))
-        alone, queries = build_index(alone), anywhere(asked)
+        alone, queries = build_index(outermost), anywhere(index.at(index.places_of(points)))
         k = min(COUNTS[-1], len(outermost))
         visit_neighbors(_fit_rims, queries, alone, k, normals, across, rims)
     return rims

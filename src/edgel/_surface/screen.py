@@ -1,4 +1,4 @@
-"""Screening: where could an edge be? By the leaves of the k-d tree first, then by plane fits at three scales."""
+"""Screening: where could an edge be? By the leaves of an octree first, then by plane fits at three scales."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel._neighbors.kdtree import NeighborIndex, leaf_starts
+from edgel._neighbors.kdtree import NeighborIndex
 from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.queries import at_places
 from edgel._surface import gather
 from edgel._surface.forest import Forest, evaluate, load_forests
-from edgel._surface.leaves import describe_leaves
+from edgel._surface.leaves import Leaves, describe_leaves
 from edgel._surface.plane_scales import SCALES
+from edgel._surface.statistics import Statistics
 
-LEAF = 0.05  # least probability of an edge in a leaf, or in one around it, for screening its points
+LEAF = 0.2  # leaves with an edge that are expected among those nearest to a leaf: least for screening its points
 POINT = 0.04  # least probability of an edge at a point, by the cheap evidence, for gathering the costly one
 
 
@@ -26,19 +27,22 @@ class Screening:
     Attributes
     ----------
     normals : (N, S, 4) float32
-        Normal and planarity of the plane fitted at each of `SCALES`; where a leaf of the index was found smooth, that
-        of the leaf.
+        Normal and planarity of the plane fitted at each of `SCALES`; where a leaf of the octree was found smooth,
+        that of the leaf.
     probability : (N,) float32
         Of an edge, by the cheap evidence.
-    statistics : (8,) float32
-        Of the cloud: see `edgel._surface.statistics`.
+    statistics : Statistics
+        Of the cloud.
+    leaves : Leaves
+        Of the octree that was looked at first.
     stretch : (3, N) float64 or None
         Of each place on scan lines: see `edgel._neighbors.scan_lines`.
     """
 
     normals: np.ndarray
     probability: np.ndarray
-    statistics: np.ndarray
+    statistics: Statistics
+    leaves: Leaves
     stretch: np.ndarray | None = None
 
     @property
@@ -56,28 +60,29 @@ class Screening:
 
 def screen(
     index: NeighborIndex,
-    statistics: np.ndarray,
+    statistics: Statistics,
     forests: Mapping[str, Forest] | None = None,
     stretch: np.ndarray | None = None,
 ) -> Screening:
-    """Gather the cheap evidence of every point that the leaves of the index do not rule out.
+    """Gather the cheap evidence of every point that the leaves of an octree do not rule out.
 
     Takes the forests "leaf" and "screen", by default those of the package, and the stretch (3, N) on scan lines.
     """
     trees = load_forests() if forests is None else forests
-    leaves = describe_leaves(index)
-    of_cloud = np.broadcast_to(statistics, (len(leaves.features), len(statistics)))
-    likely = evaluate(trees["leaf"], np.concatenate([leaves.features, of_cloud], axis=1)) >= LEAF
-    # Leaves around a likely one are kept too: how the tree cuts the cloud, which turns with it, must not matter.
-    size = np.diff(leaf_starts(index))
-    kept = np.repeat(likely[leaves.nearest].any(axis=1), size)
-    if stretch is not None:  # leaves hold points of one line, which say nothing of the surface
-        kept |= stretch.any(axis=0)
-    normals = np.repeat(leaves.planes[:, None].astype(np.float32), len(SCALES), axis=1).repeat(size, axis=0)
+    leaves, of_cloud = describe_leaves(index, statistics.cell), statistics.features
+    repeated = np.broadcast_to(of_cloud, (len(leaves.features), len(of_cloud)))
+    probable = evaluate(trees["leaf"], np.concatenate([leaves.features, repeated], axis=1))
+    # Those around a likely one are kept too: where cells begin must not matter.
+    kept = probable[leaves.nearest].sum(axis=1) >= LEAF
+    leaf = leaves.octree.leaf_of_places()
+    normals = np.repeat(leaves.planes[:, None].astype(np.float32), len(SCALES), axis=1)[leaf]
     probability = np.zeros(len(index), np.float32)
-    places = np.flatnonzero(kept)
+    asked = kept[leaf]
+    if stretch is not None:  # leaves hold points of one line, which say nothing of the surface
+        asked |= stretch.any(axis=0)
+    places = np.flatnonzero(asked)
     if len(places):
         k = min(SCALES[-1], len(index))
-        arguments = (np.array(SCALES), statistics, trees["screen"].in_step, normals, probability)
+        arguments = (np.array(SCALES), of_cloud, trees["screen"].in_step, normals, probability)
         visit_neighbors(gather.screen, at_places(index, places, places, stretch), index, k, *arguments)
-    return Screening(normals, probability, statistics, stretch)
+    return Screening(normals, probability, statistics, leaves, stretch)

@@ -16,7 +16,7 @@ from edgel._surface.plane_scales import SCALES, fit_scales
 
 NEIGHBORS = 24  # of the plane that a point is moved onto, the point among them
 FROM, ALL = 0.26, 0.32  # noise, as `cloud_noise` measures it, up to which nothing moves, and from which on all the way
-_SAMPLE = 4_000  # points that the noise is measured at
+SAMPLE = 4_000  # points that the noise is measured at
 _NEAR = 3  # neighbours that tell noise: of a point on a thin plate they lie on its own side
 _DISC = 16  # neighbours whose disc tells the area
 _OCTAVE = 0.25  # of a spacing's logarithm, rounded for the same reason
@@ -29,7 +29,7 @@ def smoothed(index: NeighborIndex) -> NeighborIndex:
     Up to half a spacing of noise points are better left alone: a plane over a crease rounds it, and the fits of two
     planes average noise away by themselves. At one spacing these no longer see which plane a point belongs to.
     """
-    share = min(max((cloud_noise(index) - FROM) / (ALL - FROM), 0.0), 1.0)
+    share = share_of(cloud_noise(index))
     if share == 0.0:
         return index
     planes, xyz = fit_planes(index, every_point(index), NEIGHBORS), index.by_point()
@@ -38,10 +38,15 @@ def smoothed(index: NeighborIndex) -> NeighborIndex:
     return build_index(np.where(np.isfinite(moved), moved, xyz))
 
 
+def share_of(noise: float) -> float:
+    """Say how far towards their planes points are moved on a cloud of this noise, 0 to 1."""
+    return min(max((noise - FROM) / (ALL - FROM), 0.0), 1.0)
+
+
 def cloud_spacing(index: NeighborIndex) -> float:
     """Measure the median, over the cloud, of the root of the area that a point stands for, rounded to a fifth."""
     k = min(_DISC, len(index))
-    squared = knn(index, at_places(index, index.sampled(_SAMPLE)), k).distances ** 2
+    squared = knn(index, at_places(index, index.sampled(SAMPLE)), k).distances ** 2
     spacing = float(np.median(np.sqrt(np.pi * squared[:, -1] / k)))
     return 2.0 ** (round(np.log2(max(spacing, 1e-300)) / _OCTAVE) * _OCTAVE)
 
@@ -52,10 +57,19 @@ def cloud_noise(index: NeighborIndex) -> float:
     The lower quartile over the cloud: 0.1 and less on clean surfaces however bent or thin they are, 0.2 at noise of 0.3
     spacings and 0.34 at one spacing, beyond which it hardly grows.
     """
-    places = index.sampled(_SAMPLE)
+    return noise_of(noise_at(index, index.sampled(SAMPLE)))
+
+
+def noise_of(off: np.ndarray) -> float:
+    """Take the quantile of what `noise_at` says of the sampled places of a cloud, in any order."""
+    return round(float(np.quantile(off, 0.25)) / _STEP) * _STEP
+
+
+def noise_at(index: NeighborIndex, places: np.ndarray) -> np.ndarray:
+    """Measure how far the nearest of some places (M,) lie off their planes, in spacings, (M,) float64."""
     off, k = np.zeros(len(places)), min(SCALES[-1], len(index))
     visit_neighbors(_measure_off, at_places(index, places), index, k, np.array(SCALES[-1:]), off)
-    return round(float(np.quantile(off, 0.25)) / _STEP) * _STEP
+    return off
 
 
 @kernel

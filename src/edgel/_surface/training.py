@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel._neighbors.kdtree import NeighborIndex, build_index, leaf_starts
+from edgel._neighbors.kdtree import NeighborIndex, build_index
 from edgel._neighbors.scan_lines import scan_line_stretch
 from edgel._surface.evidence import Evidence, gather_evidence, with_context
 from edgel._surface.forest import Forest
@@ -24,7 +24,7 @@ class ScreeningFeatures:
     Attributes
     ----------
     leaves : (L, len(LEAF)) float32
-        Of each leaf of the index, by `edgel._surface.features.LEAF`.
+        Of each leaf of the octree, by `edgel._surface.features.LEAF`.
     leaf : (N,) int64
         The leaf that each point lies in.
     points : (M,) int64
@@ -43,14 +43,14 @@ def screening_features(xyz: np.ndarray, asked: np.ndarray) -> ScreeningFeatures:
     """Describe all leaves of a cloud (N, 3), and the points asked for, (N,) bool."""
     index = smoothed(build_index(np.ascontiguousarray(xyz)))
     stretch = scan_line_stretch(index)
-    values = cloud_statistics(index, stretch)
+    statistics = cloud_statistics(index, stretch)
+    values, found = statistics.features, describe_leaves(index, statistics.cell)
     places = np.flatnonzero(asked[index.order])
     leaf = np.empty(len(index), np.int64)
-    sizes = np.diff(leaf_starts(index))
-    leaf[index.order] = np.repeat(np.arange(len(sizes)), sizes)
+    leaf[index.order] = found.octree.leaf_of_places()
     leaves, features = (
         np.concatenate([part, np.broadcast_to(values, (len(part), len(values)))], axis=1)
-        for part in (describe_leaves(index).features, describe_places(index, places, stretch))
+        for part in (found.features, describe_places(index, places, stretch)[0])
     )
     return ScreeningFeatures(leaves, leaf, index.order[places], features)
 

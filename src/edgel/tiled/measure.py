@@ -1,0 +1,102 @@
+"""What the whole cloud says: measured at sampled points in each tile, and merged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from edgel._neighbors.kdtree import build_index
+from edgel._neighbors.knn import knn
+from edgel._neighbors.queries import at_places
+from edgel._neighbors.scan_lines import AREA, are_lines, on_lines
+from edgel._neighbors.scan_lines import SAMPLE as LINES_SAMPLE
+from edgel._range_image import FEW, direction_that_explains
+from edgel._surface.plane_scales import NUM_FEATURES
+from edgel._surface.smoothing import SAMPLE as NOISE_SAMPLE
+from edgel._surface.smoothing import noise_at, noise_of, share_of
+from edgel._surface.statistics import SAMPLE, Statistics, describe_places, statistics_of
+from edgel.tiled.plan import Plan
+
+_HALO = 12.0  # spacings, at first
+
+
+def measure(plan: Plan, tile: int) -> None:
+    """Describe the sampled points in the core of a tile."""
+    plan.keep("measure", tile, lambda: _measure(plan, tile))
+
+
+def _measure(plan: Plan, tile: int) -> dict[str, np.ndarray]:
+    halo, core, total = _HALO * plan.apart, plan.tiles[tile], plan.num_points
+    while True:
+        window = plan.window(tile, halo, plan.apart)
+        xyz, _ = plan.spool.load(window)
+        empty = {name: np.zeros(0) for name in ("spacing", "noise", "lines")}
+        empty |= {"features": np.zeros((0, NUM_FEATURES)), "few": np.zeros((0, 3))}
+        if not core.holds(xyz).any():
+            return {**empty, "read": np.array(len(xyz))}
+        index = build_index(xyz)
+        own = core.holds(index.xyz.T)
+        places = (index.sampled(number, total) for number in (SAMPLE, NOISE_SAMPLE, LINES_SAMPLE, FEW))
+        described, noisy, lined, few = (some[own[some]] for some in places)
+        k, asked = min(AREA, len(index)), np.unique(np.concatenate([described, noisy, lined]))
+        reach = knn(index, at_places(index, asked), k).distances[:, -1]
+        deep = window.depth(index.at(asked))
+        if window.endless or (len(index) >= AREA and (reach < deep).all()):
+            break
+        halo *= 2
+    features, spacing = describe_places(index, described)
+    return {
+        "features": features,
+        "spacing": spacing,
+        "noise": noise_at(index, noisy),
+        "lines": on_lines(index, lined) if len(index) >= AREA else np.zeros(len(lined), bool),
+        "few": index.at(few),
+        "read": np.array(len(xyz)),
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class Whole:
+    """What the whole cloud says.
+
+    Attributes
+    ----------
+    statistics : Statistics
+    from_above : bool
+        Whether the view from above shows nearly all of a sample of the points, so that it tells near from far sides.
+    """
+
+    statistics: Statistics
+    from_above: bool
+
+
+def merge_measures(plan: Plan) -> Whole:
+    """Merge what was measured in all tiles.
+
+    Raises
+    ------
+    ValueError
+        If the cloud is one that only a whole can be seen of: too noisy, or shown best from one side.
+    """
+    found = [plan.load("measure", tile) for tile in range(len(plan.tiles))]
+    features, spacing, noise, lines, few = (
+        np.concatenate([part[name] for part in found]) for name in ("features", "spacing", "noise", "lines", "few")
+    )
+    if plan.num_points >= AREA and are_lines(lines):
+        raise ValueError(
+            "points: they lie on scan lines far apart, whose metric is not known in tiles; run it whole, or thin "
+            "it (edgel.thin) to the distance of the lines"
+        )
+    if share_of(noise_of(noise)) > 0:
+        raise ValueError(
+            f"points: noise of {noise_of(noise):.2f} spacings off the surface has to be smoothed away first, which is "
+            "not done in tiles; thin the cloud (edgel.thin) to a spacing above its noise"
+        )
+    direction = direction_that_explains(few) if plan.options.viewpoint is None else None
+    if direction is not None and not (direction == (0.0, 0.0, -1.0)).all():
+        raise ValueError(
+            f"points: the cloud shows as a whole along {direction.round(2).tolist()}, and tiles are columns along z; "
+            "turn it so that it is seen from above, or give a viewpoint"
+        )
+    return Whole(statistics_of(features.astype(np.float32), spacing), direction is not None)

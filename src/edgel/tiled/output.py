@@ -1,0 +1,103 @@
+"""What a run leaves: the edge points of each input in a file of their own, and an index of all of them."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from edgel._faces import Faces
+from edgel._neighbors.normals import SENSOR, UNKNOWN
+from edgel.edges import Edges
+from edgel.io import read, write
+from edgel.tiled.box import Box
+from edgel.tiled.plan import Plan
+from edgel.tiled.spool import ROWS, Part
+
+_FIELDS = ("kind", "strength", *Faces.__dataclass_fields__)
+
+
+def edges_of(plan: Plan, part: Part) -> Edges:
+    """Gather the edge points of one file from the tiles that it reaches into."""
+    low, high = (np.array(corner[:2]) for corner in (part.low, part.high))
+    box = Box(tuple(low.tolist()), tuple(np.nextafter(high, np.inf).tolist()))
+    keys, columns = [], {name: [] for name in _FIELDS}
+    for tile in plan.around(box) if part.num_points else range(1):
+        with plan.load("label", tile) as found:
+            mine = found["key"] >> ROWS == part.number
+            keys.append(found["key"][mine])
+            for name in _FIELDS:
+                columns[name].append(found[name][mine])
+    key = np.concatenate(keys)
+    order = np.argsort(key)
+    return Edges(
+        index=key[order] & ((1 << ROWS) - 1),
+        **{name: np.concatenate(parts)[order] for name, parts in columns.items()},
+        orientation=UNKNOWN if plan.options.viewpoint is None else SENSOR,
+        num_points=part.num_rows,
+        num_dropped=part.num_rows - part.num_points,
+        method="surface",
+        reason="in tiles",
+        parameters={"min_strength": plan.options.min_strength, "num_neighbors": plan.options.num_neighbors},
+        seconds={},
+    )
+
+
+def write_part(folder: Path, number: int, target: str) -> None:
+    """Write the edge points of one file with all their attributes, unless that is done."""
+    plan = Plan.read(folder)
+    part = plan.spool.parts[number]
+    done = folder / "written" / f"{number:06d}"
+    if done.exists() and Path(target).exists():
+        return
+    edges = edges_of(plan, part)
+    if part.num_points:
+        write(target, edges.to_cloud(read(part.path)))
+    done.parent.mkdir(exist_ok=True)
+    done.touch()
+
+
+def write_index(path: Path, plan: Plan, targets: Sequence[str]) -> None:
+    """Write a virtual point cloud (.vpc): a STAC catalogue of the files, as PDAL and QGIS read it."""
+    features = [
+        _item(part, target, path.parent)
+        for part, target in zip(plan.spool.parts, targets, strict=True)
+        if part.num_points and Path(target).suffix.lower() in (".las", ".laz")
+    ]
+    aside = path.with_name(f"{path.name}.{os.getpid()}.part")
+    aside.write_text(json.dumps({"type": "FeatureCollection", "features": features}, indent=1))
+    os.replace(aside, path)
+
+
+def _item(part: Part, target: str, folder: Path) -> dict[str, object]:
+    edges = len(read(target))
+    (x0, y0, z0), (x1, y1, z1) = part.low, part.high
+    ring = [[x0, y0, z0], [x1, y0, z0], [x1, y1, z0], [x0, y1, z0], [x0, y0, z0]]
+    properties: dict[str, object] = {
+        "datetime": None,
+        "start_datetime": "1970-01-01T00:00:00Z",
+        "end_datetime": "1970-01-01T00:00:00Z",
+        "pc:count": edges,
+        "pc:encoding": Path(target).suffix.lower()[1:],
+        "pc:type": "lidar",
+        "proj:bbox": [x0, y0, z0, x1, y1, z1],
+        "proj:geometry": {"type": "Polygon", "coordinates": [ring]},
+    }
+    if part.crs is not None:
+        properties["proj:wkt2"] = part.crs
+    return {
+        "type": "Feature",
+        "stac_version": "1.0.0",
+        "stac_extensions": [
+            "https://stac-extensions.github.io/pointcloud/v1.0.0/schema.json",
+            "https://stac-extensions.github.io/projection/v1.1.0/schema.json",
+        ],
+        "id": Path(target).stem,
+        "geometry": None,
+        "links": [],
+        "properties": properties,
+        "assets": {"data": {"href": f"./{os.path.relpath(target, folder)}", "roles": ["data"]}},
+    }

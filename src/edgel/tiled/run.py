@@ -1,0 +1,268 @@
+"""All passes, one after the other."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from edgel._detect import DEFAULT_KINDS
+from edgel._labels import LIKELY
+from edgel.cloud import as_vector
+from edgel.edges import EdgeKind, Edges, as_kinds
+from edgel.tiled.chains import draw_line, link_tile, merge_chains
+from edgel.tiled.classify import classify_tile
+from edgel.tiled.engine import Engine, start
+from edgel.tiled.label import label_tile
+from edgel.tiled.manifest import check_manifest
+from edgel.tiled.measure import measure, merge_measures
+from edgel.tiled.output import edges_of, write_index, write_part
+from edgel.tiled.plan import Options, Plan, cut, origin_left_out
+from edgel.tiled.spool import BYTES_A_POINT, Part, Spool, spool
+
+TILE_POINTS = 3_000_000
+_EXPANDS = 8  # bytes of points in the spool for one of a compressed file, at most
+
+
+class TileError(OSError):
+    """Some tiles failed twice: the message names them and why, and the same call goes on with them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tiled:
+    """What a run in tiles has left.
+
+    Attributes
+    ----------
+    folder : Path
+    outputs : sequence of str
+        The file of each input's edge points, in the order of the inputs.
+    num_points, num_edges, num_tiles : int
+    points_read : int
+        Points read of the spool for classification, halos included.
+    notices : sequence of str
+        What its user should know.
+    """
+
+    folder: Path
+    outputs: Sequence[str]
+    num_points: int
+    num_edges: int
+    num_tiles: int
+    points_read: int
+    notices: Sequence[str]
+
+    def edges(self, number: int) -> Edges:
+        """Return the edge points of an input, by its number in the order given."""
+        plan = Plan.read(self.folder / "work")
+        return edges_of(plan, plan.spool.parts[number])
+
+
+def detect(
+    files: Sequence[str | os.PathLike[str]],
+    folder: str | os.PathLike[str],
+    *,
+    tile_points: int = TILE_POINTS,
+    workers: int = 1,
+    scheduler: str | None = None,
+    extension: str | None = None,
+    overwrite: bool = False,
+    kinds: EdgeKind | str | Iterable[str] = DEFAULT_KINDS,
+    min_strength: float = LIKELY,
+    num_neighbors: int = 16,
+    viewpoint: Any = None,
+    progress: Callable[[str], None] | None = None,
+) -> Tiled:
+    """Find the edge points of a cloud that lies in several files, tile by tile.
+
+    The answer is that of ``edgel.detect(points, method="surface")`` for all points together, to the bit on one kind of
+    CPU, whatever the tiles. The same call again goes on where it stopped.
+
+    Parameters
+    ----------
+    files : sequence of path
+        The parts of the cloud, all in one frame.
+    folder : path
+        Takes a file of edge points for each input, an index of them (``edges.vpc``), and what is needed to go on.
+    tile_points : int
+        Points of a tile, at most, without its halo: they decide the memory of a worker, 0.3 to 0.6 kB a point.
+    workers : int
+        Processes on this machine; more than one need Dask distributed.
+    scheduler : str, optional
+        Address of a Dask cluster whose workers see the same folder, such as ``"tcp://10.0.0.1:8786"``.
+    extension : str, optional
+        Of the files written, ``".laz"``; by default that of each input.
+    overwrite : bool
+        Whether results of other files or options in the folder are removed first.
+    kinds, min_strength, num_neighbors, viewpoint
+        As in `edgel.detect`.
+    progress : callable, optional
+        Called with a line for people, pass by pass and tile by tile.
+
+    Returns
+    -------
+    Tiled
+
+    Raises
+    ------
+    FileNotFoundError, FormatError, ValueError
+        If a file cannot be read, lies in another frame (CRS) than the first, or is a view of its own; if the cloud is
+        one that tiles cannot answer (much noise, color edges, normals of its own without a viewpoint); if the folder
+        holds results of something else; if the disk is too small. The message names the file and the remedy.
+    TileError
+        If a tile failed twice; the others are done, and the same call does what is missing.
+
+    Examples
+    --------
+    >>> import tempfile, numpy as np, edgel, edgel.tiled
+    >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(60.0), np.arange(40.0)))
+    >>> roof = np.c_[x, y, -abs(x - 30.2)]
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     for name, part in (("west", roof[x < 25]), ("east", roof[x >= 25])):
+    ...         edgel.write(f"{folder}/{name}.npy", edgel.Cloud(part))
+    ...     found = edgel.tiled.detect([f"{folder}/west.npy", f"{folder}/east.npy"], f"{folder}/out")
+    ...     len(edgel.read(f"{folder}/out/east.npy")) == len(found.edges(1)) > 0
+    True
+    """
+    options = _options(kinds, min_strength, num_neighbors, viewpoint, tile_points)
+    paths, folder, say = [os.fspath(file) for file in files], Path(folder), progress or (lambda line: None)
+    if not paths:
+        raise ValueError("files: none were given; name at least one")
+    if len({os.path.abspath(path) for path in paths}) < len(paths):
+        raise ValueError("files: a file is named twice, and its points would be; name it once")
+    outputs = _outputs(paths, folder, extension)
+    if overwrite:
+        shutil.rmtree(folder / "work", ignore_errors=True)
+        (folder / "manifest.json").unlink(missing_ok=True)
+    work = folder / "work"
+    work.mkdir(parents=True, exist_ok=True)
+    notices = check_manifest(folder, paths, options)
+    _check_disk(paths, work)
+    with start(workers, scheduler, say) as engine:
+        plan = _prepare(engine, paths, work, options)
+        _passes(engine, plan)
+        jobs = [(work, number, output) for number, output in enumerate(outputs)]
+        _raise_for(engine.run("writing", write_part, jobs), "file", paths)
+    write_index(folder / "edges.vpc", plan, outputs)
+    edges, read = _count(plan)
+    return Tiled(folder, outputs, plan.num_points, edges, len(plan.tiles), read, notices)
+
+
+def _options(kinds: Any, min_strength: float, num_neighbors: int, viewpoint: Any, tile_points: int) -> Options:
+    flags = as_kinds(kinds)
+    if flags & (EdgeKind.COLOR | EdgeKind.FRAME):
+        raise ValueError("kinds: color and frame edges are not looked for in tiles; leave them out")
+    if not 0 < min_strength <= 1:
+        raise ValueError(f"min_strength: expected a number above 0 and at most 1, got {min_strength}")
+    if num_neighbors < 3:
+        raise ValueError(f"num_neighbors: a plane needs at least 3, got {num_neighbors!r}")
+    if tile_points < 1000:
+        raise ValueError(f"tile_points: expected 1000 points or more, got {tile_points}")
+    place = None if viewpoint is None else tuple(as_vector(viewpoint, "viewpoint").tolist())
+    return Options(int(flags), float(min_strength), int(num_neighbors), place, int(tile_points))
+
+
+def _outputs(paths: Sequence[str], folder: Path, extension: str | None) -> list[str]:
+    """Name the output of each file by its own name; of files of one name by their numbers too."""
+    stems = [Path(path).stem for path in paths]
+    return [
+        str(folder / f"{stem if stems.count(stem) == 1 else f'{stem}_{number}'}{extension or Path(path).suffix}")
+        for number, (path, stem) in enumerate(zip(paths, stems, strict=True))
+    ]
+
+
+def _check_disk(paths: Sequence[str], work: Path) -> None:
+    missing = [path for n, path in enumerate(paths) if not (work / "spool" / f"{n:06d}" / "part.json").exists()]
+    needed = _EXPANDS * sum(os.path.getsize(path) for path in missing)
+    free = shutil.disk_usage(work).free
+    if needed > free:
+        raise OSError(
+            f"{work}: about {needed / 1e9:.1f} GB are needed beside the inputs, and {free / 1e9:.1f} GB are free; name "
+            f"a folder on a larger disk ({BYTES_A_POINT} bytes a point, and the results)"
+        )
+
+
+def _prepare(engine: Engine, paths: Sequence[str], work: Path, options: Options) -> Plan:
+    """Fill the spool, check that the files are one cloud, and cut it."""
+    jobs = [(path, number, work / "spool") for number, path in enumerate(paths)]
+    failed = engine.run("reading", spool, jobs)
+    if failed:
+        error = next(iter(failed.values()))
+        more = f"; {', '.join(paths[n] for n in [*failed][1:])} failed too" if len(failed) > 1 else ""
+        raise ValueError(
+            f"{error}{more}; every file is needed for the answer: mend it, or leave it out; all others are read"
+        ) from error
+    parts = [spool(path, number, work / "spool") for number, path in enumerate(paths)]
+    _check_parts(parts, options)
+    tiles = cut(Spool(work / "spool", parts, origin_left_out(parts)), options.tile_points)
+    plan = Plan(work, options, tiles, len(parts))
+    plan.save()
+    return plan
+
+
+def _check_parts(parts: Sequence[Part], options: Options) -> None:
+    some = [part for part in parts if part.num_points]
+    if sum(part.num_points for part in some) < 3:
+        raise ValueError("files: needs at least 3 points with finite coordinates in all of them")
+    for part in some:
+        if part.crs != some[0].crs:
+            raise ValueError(
+                f"{part.path}: its CRS ({(part.crs or 'none')[:60]}) is not that of {some[0].path} "
+                f"({(some[0].crs or 'none')[:60]}); transform it, or leave it out"
+            )
+        if part.normals and options.viewpoint is None:
+            raise ValueError(
+                f"{part.path}: has normals of its own, which would tell the outside, and tiles do not ask them; "
+                "give a viewpoint, or leave out nx, ny and nz"
+            )
+
+
+def _passes(engine: Engine, plan: Plan) -> None:
+    tiles = range(len(plan.tiles))
+    names = [f"x {t.low[0]:g} to {t.high[0]:g}, y {t.low[1]:g} to {t.high[1]:g}" for t in plan.tiles]
+    _raise_for(engine.run("measuring", _measure, [(plan.folder, tile) for tile in tiles]), "tile", names)
+    whole = merge_measures(plan)
+    _raise_for(engine.run("classifying", _classify, [(plan.folder, whole, tile) for tile in tiles]), "tile", names)
+    line = draw_line(plan, whole)
+    _raise_for(engine.run("linking", _link, [(plan.folder, whole, line, tile) for tile in tiles]), "tile", names)
+    merge_chains(plan)
+    _raise_for(engine.run("placing", _label, [(plan.folder, whole, line, tile) for tile in tiles]), "tile", names)
+
+
+def _measure(folder: Path, tile: int) -> None:
+    measure(Plan.read(folder), tile)
+
+
+def _classify(folder: Path, whole: Any, tile: int) -> None:
+    classify_tile(Plan.read(folder), whole, tile)
+
+
+def _link(folder: Path, whole: Any, line: Any, tile: int) -> None:
+    link_tile(Plan.read(folder), whole, line, tile)
+
+
+def _label(folder: Path, whole: Any, line: Any, tile: int) -> None:
+    label_tile(Plan.read(folder), whole, line, tile)
+
+
+def _raise_for(failed: dict[int, BaseException], what: str, names: Sequence[str]) -> None:
+    if failed:
+        error = next(iter(failed.values()))
+        where = "; ".join(f"{what} {n} ({names[n]})" for n in failed)
+        raise TileError(
+            f"{where} failed twice, the first with: {error!r:.300}; all others are done, and the same call does "
+            "what is missing"
+        ) from error
+
+
+def _count(plan: Plan) -> tuple[int, int]:
+    edges = read = 0
+    for tile in range(len(plan.tiles)):
+        with plan.load("label", tile) as found:
+            edges += len(found["key"])
+        with plan.load("classify", tile) as found:
+            read += int(found["read"])
+    return edges, read

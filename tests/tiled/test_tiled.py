@@ -1,0 +1,194 @@
+"""Tiles give the answer of the whole cloud, to the bit, however they are cut, and go on where they were stopped."""
+
+import json
+import os
+import subprocess
+import sys
+from collections import namedtuple
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import edgel
+from edgel import tiled
+from edgel.tiled import engine, run
+from edgel.tiled.plan import Plan
+
+FIELDS = ("kind", "strength", "position", "position_std", "scale", "direction", "normals", "angle", "convex")
+
+
+def check_same(found, whole, lengths):
+    """The edges of all inputs, one after the other, are those of the whole, bit for bit."""
+    parts = [found.edges(number) for number in range(len(lengths))]
+    first = np.cumsum([0, *lengths])
+    index = np.concatenate([part.index + begin for part, begin in zip(parts, first, strict=False)])
+    np.testing.assert_array_equal(index, whole.index)
+    for name in FIELDS:
+        mine = np.concatenate([getattr(part, name) for part in parts])
+        assert mine.tobytes() == getattr(whole, name).tobytes(), name
+
+
+def lengths_of(files):
+    return [len(np.load(file, mmap_mode="r")) for file in files]
+
+
+@pytest.mark.parametrize("tile_points", [1_000, 3_500, 10**6])
+def test_any_tiling_gives_the_answer_of_the_whole(files, strip, whole, tmp_path, tile_points):
+    found = tiled.detect(files, tmp_path / "out", tile_points=tile_points)
+    assert len(Plan.read(tmp_path / "out" / "work").tiles) == found.num_tiles >= len(strip) / tile_points
+    check_same(found, whole, lengths_of(files))
+    assert found.num_edges == len(whole) > 500
+    assert {*np.unique(whole.kind)} >= {edgel.EdgeKind.CREASE, edgel.EdgeKind.OCCLUDING, edgel.EdgeKind.OCCLUDED}
+    for number, (file, output) in enumerate(zip(files, found.outputs, strict=True)):
+        assert edgel.read(output).xyz.tobytes() == np.load(file)[found.edges(number).index].tobytes()
+
+
+def test_a_sensor_tells_the_outside_in_tiles_too(files, strip, tmp_path):
+    above = strip.mean(axis=0) + [0, 0, 900.0]
+    wanted = edgel.detect(strip, method="surface", viewpoint=above, kinds="crease", min_strength=0.3)
+    found = tiled.detect(files, tmp_path / "out", tile_points=3_000, viewpoint=above, kinds="crease", min_strength=0.3)
+    check_same(found, wanted, lengths_of(files))
+    assert (wanted.convex == 1).any()
+
+
+def test_two_workers_give_the_same(files, whole, tmp_path):
+    pytest.importorskip("distributed", reason="the extra tiles is not installed")
+    found = tiled.detect(files, tmp_path / "out", tile_points=3_500, workers=2)
+    check_same(found, whole, lengths_of(files))
+
+
+STOPPED = """
+import os, sys
+from edgel import tiled
+left = int(sys.argv[1])
+def say(line):
+    global left
+    left -= 1
+    if not left:
+        os._exit(9)  # as by kill -9: nothing is tidied up
+tiled.detect(sys.argv[3:], sys.argv[2], tile_points=3_500, progress=say)
+"""
+
+
+def test_a_run_that_was_killed_goes_on(files, whole, tmp_path):
+    out = tmp_path / "out"
+    killed = subprocess.run([sys.executable, "-c", STOPPED, "9", str(out), *files], check=False)
+    assert killed.returncode == 9
+    kept = {path: path.stat().st_mtime_ns for path in (out / "work").rglob("*.npz")}
+    assert kept
+    (out / "work" / "label").mkdir(exist_ok=True)
+    (out / "work" / "label" / "000000.123.part.npz").write_bytes(b"half")  # what a kill may leave
+    found = tiled.detect(files, out, tile_points=3_500)
+    check_same(found, whole, lengths_of(files))
+    assert {path: path.stat().st_mtime_ns for path in kept} == kept  # nothing was done twice
+    again = {path: path.stat().st_mtime_ns for path in out.rglob("*.np[yz]")}
+    tiled.detect(files, out, tile_points=3_500)
+    assert {path: path.stat().st_mtime_ns for path in out.rglob("*.np[yz]")} == again
+
+
+def test_a_tile_that_fails_is_tried_alone_and_named(files, whole, tmp_path, monkeypatch):
+    real, calls = run.classify_tile, []
+
+    def failing(plan, answer, tile):
+        calls.append(tile)
+        if tile == 1 and not (tmp_path / "mended").exists():
+            raise OSError("no luck")
+        real(plan, answer, tile)
+
+    monkeypatch.setattr(run, "classify_tile", failing)
+    with pytest.raises(tiled.TileError, match=r"tile 1 \(x .*no luck.*all others are done"):
+        tiled.detect(files, tmp_path / "out", tile_points=3_500)
+    assert calls == [*range(max(calls) + 1), 1]  # all, and that one once more
+    (tmp_path / "mended").touch()
+    check_same(tiled.detect(files, tmp_path / "out", tile_points=3_500), whole, lengths_of(files))
+
+
+def test_results_of_something_else_are_refused(files, tmp_path):
+    out = tmp_path / "out"
+    tiled.detect(files, out, tile_points=10**6)
+    with pytest.raises(ValueError, match=r"another options.*--overwrite"):
+        tiled.detect(files, out, tile_points=10**6, min_strength=0.4)
+    with pytest.raises(ValueError, match=r"other files.*--overwrite"):
+        tiled.detect(files[:2], out, tile_points=10**6)
+    points = np.load(files[1])
+    os.utime(files[1], ns=(1, 1))  # touched, and the same
+    tiled.detect(files, out, tile_points=10**6)
+    points[5, 2] += 0.5
+    np.save(files[1], points)
+    with pytest.raises(ValueError, match=r"line1.npy: changed since"):
+        tiled.detect(files, out, tile_points=10**6)
+    found = tiled.detect(files, out, tile_points=10**6, overwrite=True)
+    check_same(found, edgel.detect(np.concatenate([np.load(f) for f in files]), method="surface"), lengths_of(files))
+
+
+def test_empty_files_are_no_harm_and_damaged_ones_are_named(files, whole, tmp_path):
+    empty, damaged = str(tmp_path / "empty.npy"), tmp_path / "damaged.npy"
+    np.save(empty, np.zeros((0, 3)))
+    found = tiled.detect([*files, empty], tmp_path / "out", tile_points=10**6)
+    check_same(found, whole, [*lengths_of(files), 0])
+    damaged.write_bytes(Path(files[0]).read_bytes()[:5000])
+    with pytest.raises(ValueError, match=r"damaged.npy.*mend it, or leave it out"):
+        tiled.detect([*files, str(damaged)], tmp_path / "other")
+    with pytest.raises(FileNotFoundError, match="nowhere"):
+        tiled.detect([*files, "nowhere.npy"], tmp_path / "third")
+
+
+def test_what_is_not_one_cloud_is_refused(strip, tmp_path):
+    for name, crs in (("a", "EPSG:25832"), ("b", "EPSG:25833")):
+        edgel.write(tmp_path / f"{name}.laz", edgel.Cloud(strip[:500], crs=crs))
+    with pytest.raises(ValueError, match=r"b.laz: its CRS"):
+        tiled.detect([tmp_path / "a.laz", tmp_path / "b.laz"], tmp_path / "out")
+    grid = np.stack(np.meshgrid(np.arange(20.0), np.arange(20.0), [0.0]), axis=-1)[:, :, 0]
+    np.save(tmp_path / "grid.npy", grid)
+    with pytest.raises(ValueError, match=r"grid.npy: an organized cloud"):
+        tiled.detect([tmp_path / "grid.npy"], tmp_path / "out2")
+    with pytest.raises(ValueError, match="named twice"):
+        tiled.detect([tmp_path / "a.laz", tmp_path / "a.laz"], tmp_path / "out")
+
+
+def test_much_noise_is_refused(strip, tmp_path):
+    noisy = strip + np.random.default_rng(0).normal(0, 1.0, strip.shape)
+    np.save(tmp_path / "noisy.npy", noisy)
+    with pytest.raises(ValueError, match="smoothed away first"):
+        tiled.detect([tmp_path / "noisy.npy"], tmp_path / "out", tile_points=3_500)
+
+
+def test_a_disk_that_is_too_small_is_told_before(files, tmp_path, monkeypatch):
+    usage = namedtuple("usage", "total used free")
+    monkeypatch.setattr(run.shutil, "disk_usage", lambda path: usage(10, 9, 1))
+    with pytest.raises(OSError, match="larger disk"):
+        tiled.detect(files, tmp_path / "out")
+
+
+def test_an_index_lists_the_files(strip, tmp_path):
+    files = [tmp_path / "west.laz", tmp_path / "east.las"]
+    for file, part in zip(files, np.array_split(strip, 2), strict=True):
+        edgel.write(file, edgel.Cloud(part, {"intensity": np.arange(len(part), dtype=np.uint16)}, crs="EPSG:25832"))
+    found = tiled.detect(files, tmp_path / "out", extension=".laz")
+    index = json.loads((tmp_path / "out" / "edges.vpc").read_text())
+    assert [each["assets"]["data"]["href"] for each in index["features"]] == ["./west.laz", "./east.laz"]
+    assert sum(each["properties"]["pc:count"] for each in index["features"]) == found.num_edges > 0
+    assert "25832" in index["features"][0]["properties"]["proj:wkt2"]
+    assert {"intensity", "edge_kind"} <= set(edgel.read(found.outputs[1]).attributes)
+
+
+def test_tiles_share_no_point_and_leave_none_out(files, strip, tmp_path):
+    tiled.detect(files, tmp_path / "out", tile_points=1_000)
+    plan = Plan.read(tmp_path / "out" / "work")
+    held = np.sum([tile.holds(strip) for tile in plan.tiles], axis=0)
+    assert (held == 1).all()
+    loaded = [plan.spool.load(tile) for tile in plan.tiles]
+    assert all((np.diff(keys) > 0).all() for _, keys in loaded)
+    assert sorted(map(tuple, np.concatenate([xyz for xyz, _ in loaded]))) == sorted(map(tuple, strip))
+    assert all(a.high != b.high or a.low != b.low for a, b in pairwise(plan.tiles))
+
+
+def test_several_workers_need_dask(monkeypatch):
+    monkeypatch.setitem(sys.modules, "dask", None)
+    with (
+        pytest.raises(ModuleNotFoundError, match=r"edgel\[tiles\]"),
+        engine.start(2, None, lambda line: None),
+    ):
+        pass
