@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from edgel.curves import _fit
-from edgel.curves._circle import RADIUS, along_of
-from edgel.curves._corners import Ends, Nodes, meet
-from edgel.curves._curves import CurveKind, Curves
+from edgel.curves._circle import RADIUS
+from edgel.curves._corners import Ends, meet
+from edgel.curves._curves import Curves
 from edgel.curves._extent import extents
 from edgel.curves._gather import on_shapes
 from edgel.curves._points import EdgePoints
 from edgel.curves._shapes import Shapes
-from edgel.edges import EdgeKind, Edges
+from edgel.edges import Edges
 
 _SHORT = 2.5  # spacings: a shorter curve that meets nothing is none
 _SHORTEST = 1.0
@@ -21,10 +21,10 @@ _SHORTEST = 1.0
 def assemble(shapes: Shapes, xyz: np.ndarray, points: EdgePoints, edges: Edges, origin: np.ndarray, crs: str | None) -> Curves:
     """Make curves of shapes."""
     position = shapes.smoothed.position
-    ext = extents(shapes.measured, xyz, shapes.rows, position, shapes.ranges, shapes.spacing)
+    ext = extents(shapes.measured, xyz, shapes.rows, position, shapes.measured.ranges, shapes.spacing)
     S = ext.shape
     shape, fit, spacing = shapes.measured.shape[S], shapes.measured.fit[S], shapes.spacing[S]
-    runs = [r for r in shapes.runs]
+    runs = [r for r in shapes.runs if points.strength[r].mean()>.38 and points.strength[r].max()>.5 and len(r)>=4]
     ends = _ends(shape, fit, ext.ends, ext.closed, spacing)
     nodes = meet(ends, shape, spacing)
     alongs = ext.ends.copy()
@@ -37,8 +37,13 @@ def assemble(shapes: Shapes, xyz: np.ndarray, points: EdgePoints, edges: Edges, 
             a = np.where(around > 0, a + around * np.round((alongs[k, e] - a) / np.where(around > 0, around, 1)), a)
         alongs[k, e] = a
     length = alongs[:, 1] - alongs[:, 0]
-    keep = (length > _SHORT * spacing) | ((nodes.of_end >= 0).any(axis=1) & (length > _SHORTEST * spacing))
-    return dict(shape=shape, fit=fit, alongs=alongs, closed=ext.closed, spacing=spacing, nodes=nodes, keep=keep, runs=runs, position=position, origin=origin)
+    total = np.array([points.strength[shapes.rows[0][shapes.rows[1][k]:shapes.rows[1][k+1]]].sum() for k in S])
+    number = np.array([shapes.rows[1][k+1]-shapes.rows[1][k] for k in S])
+    alllen = np.bincount(S, (ext.ends[:,1]-ext.ends[:,0])/spacing, minlength=len(shapes.spacing))[S]
+    evid = total/np.maximum(alllen,1)
+    strong = (evid > .33) & (total/number > .3)
+    keep = strong & ((length > _SHORT * spacing) | ((nodes.of_end >= 0).any(axis=1) & (length > _SHORTEST * spacing)))
+    return dict(shape=shape, fit=fit, alongs=alongs, closed=ext.closed, spacing=spacing, nodes=nodes, keep=keep, runs=runs, position=position, origin=origin, sidx=S, rows=[points.rows[shapes.rows[0][shapes.rows[1][k]:shapes.rows[1][k+1]]] for k in S], runrows=[points.rows[r] for r in runs])
 
 
 def _along(shape, p):

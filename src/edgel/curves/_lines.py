@@ -11,13 +11,12 @@ from edgel.curves import _fit
 from edgel.curves._circle import local, set_frame
 from edgel.curves._profile import choose_sides, face_of, mean_normals
 
-_REACH = 4.5
 _SHORT = 6  # edge points: with fewer the direction along a free end is not fitted to them
 _CORRELATED = 3.0  # edge points next to each other come from the same points of the cloud
 
 
 @kernel
-def fit_line_faces(shape, beside, xyz, rows, position, normals, h, low, high, fit):
+def fit_line_faces(shape, beside, xyz, rows, position, normals, h, reach, low, high, fit):
     """Move a line to where its faces meet, and write what is known of them.
 
     Takes the points beside it (rows of `xyz`), its edge points (rows of `position` and `normals`), and from where to
@@ -49,7 +48,7 @@ def fit_line_faces(shape, beside, xyz, rows, position, normals, h, low, high, fi
         for q in inside:
             t = (s[q] - middle) / half
             a, b = x[q] - x0 - x1 * t, y[q] - y0 - y1 * t
-            k, off, along = face_of(a, b, h, tolerance, _REACH, faces, inward, bend)
+            k, off, along = face_of(a, b, h, tolerance, reach, faces, inward, bend)
             if k < 0:
                 continue
             weight = _fit.weight_of(off, tolerance)

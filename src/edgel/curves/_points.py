@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from edgel._kernels.parallel import kernel
 from edgel._neighbors.kdtree import NeighborIndex, build_index
 from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.queries import at_points
 from edgel._neighbors.spacing import disc_spacing
-from edgel._kernels.parallel import kernel
 from edgel.edges import EdgeKind, Edges
 
 LEFT_OUT = EdgeKind.OCCLUDED | EdgeKind.FRAME
@@ -32,6 +32,7 @@ class EdgePoints:
     normals : (E, 2, 3) float64
     kind : (E,) uint8
     convex : (E,) int8
+    strength : (E,) float64
     spacing : (E,) float64
     index : NeighborIndex
         Of the cloud.
@@ -43,6 +44,7 @@ class EdgePoints:
     normals: np.ndarray
     kind: np.ndarray
     convex: np.ndarray
+    strength: np.ndarray
     spacing: np.ndarray
     index: NeighborIndex
 
@@ -63,7 +65,7 @@ def edge_points(xyz: np.ndarray, points: np.ndarray, edges: Edges, origin: np.nd
     spacing[spacing <= 0] = float(np.median(known)) if len(known) else 1.0
     parts = (edges.position - origin, edges.direction, edges.normals)
     position, direction, normals = (np.ascontiguousarray(part[rows], np.float64) for part in parts)
-    return EdgePoints(rows, position, direction, normals, kind[rows], edges.convex[rows], spacing, index)
+    return EdgePoints(rows, position, direction, normals, kind[rows], edges.convex[rows], edges.strength[rows], spacing, index)
 
 
 @kernel

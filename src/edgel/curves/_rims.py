@@ -19,14 +19,13 @@ UNKNOWNS = 10
 """Tilt of the axis (2), place of the centre across it (2), radius, height, turn of both faces (2), their bends (2); in
 spacings, the tilts by the radius."""
 TILT, CENTRE, SIZE, HEIGHT, TURN, BENT = 0, 2, 4, 5, 6, 8
-_REACH = 4.5
 _SQUARE = 0.03  # of a face's normal: so near the axis or across it, a plane or a cylinder is meant
 _CORRELATED = 3.0  # edge points next to each other come from the same points of the cloud
 _FIRM = 1e-4  # weight of one point for what no point decides
 
 
 @kernel
-def fit_rim_faces(shape, beside, xyz, rows, position, normals, h, low, high, fit, covariance):
+def fit_rim_faces(shape, beside, xyz, rows, position, normals, h, reach, low, high, fit, covariance):
     """Move a circle to where its faces meet; write what is known of them, and the covariance (10, 10) of all unknowns.
 
     Takes the same as `_lines.fit_line_faces`.
@@ -49,7 +48,7 @@ def fit_rim_faces(shape, beside, xyz, rows, position, normals, h, low, high, fit
         if turn == 4:
             free[BENT:] = True
         _collect(
-            shape, inside, xyz, h, tolerance, faces, inward, bend, spread, system, right, number
+            shape, inside, xyz, h, reach, tolerance, faces, inward, bend, spread, system, right, number
         )
         for k in range(2):
             if number[k] < _fit.LEAST:
@@ -109,7 +108,7 @@ def _derivatives(shape, a, b, c, mr, mz, h, terms):
 
 
 @kernel
-def _collect(shape, inside, xyz, h, tolerance, faces, inward, bend, spread, system, right, number):
+def _collect(shape, inside, xyz, h, reach, tolerance, faces, inward, bend, spread, system, right, number):
     """Add up the equations of all points of the faces, each face's by its spread, and write spreads and numbers."""
     system[:], right[:], number[:] = 0.0, 0.0, 0.0
     terms = np.zeros(UNKNOWNS)
@@ -120,7 +119,7 @@ def _collect(shape, inside, xyz, h, tolerance, faces, inward, bend, spread, syst
     for i in inside:
         a, b, c = local(shape, xyz[i, 0], xyz[i, 1], xyz[i, 2])
         p = math.sqrt(a * a + b * b) - shape[RADIUS]
-        k, off, along = face_of(p, c, h, tolerance, _REACH, faces, inward, bend)
+        k, off, along = face_of(p, c, h, tolerance, reach, faces, inward, bend)
         if k < 0:
             continue
         terms[:] = 0.0
