@@ -16,9 +16,9 @@ REACH = 3.5
 """Spacings: so far from where its points end a curve meets others."""
 _ASIDE = 0.7  # spacings: farther from a curve lies no corner of it, unless the curve is unsure
 _MOST = 8  # ends near each that are tried
-_PRIOR = 3.0  # spacings: standard deviation of a corner about the ends, where no face decides
+PRIOR = 3.0  # spacings: standard deviation of a corner about the ends, where no face decides
 _FLOOR = 0.02  # spacings: no face is surer
-_CORNER = math.cos(math.radians(20.0))  # between tangents: nearer to straight the joint is smooth
+CORNER = math.cos(math.radians(20.0))  # between tangents: nearer to straight the joint is smooth
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +138,7 @@ def _solve(members, count, places, squares, rights, spacing, curve, position):
         side += rights[i]
         mean += places[i] / count
         h += spacing[curve[i]] / count
-    prior = 1.0 / (_PRIOR * h) ** 2
+    prior = 1.0 / (PRIOR * h) ** 2
     for axis in range(3):
         matrix[axis, axis] += prior
         side[axis] += prior * mean[axis]
@@ -199,6 +199,6 @@ def _settle(ring, number, places, tangents, squares, rights, curve, shapes, spac
                     tangents[i, 0] * tangents[j, 0] + tangents[i, 1] * tangents[j, 1] + tangents[i, 2] * tangents[j, 2]
                 )
                 straight = min(straight, cosine)
-        is_corner[found] = straight < _CORNER
+        is_corner[found] = straight < CORNER
         found += 1
     return found

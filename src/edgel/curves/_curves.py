@@ -70,6 +70,8 @@ class Curves:
         Root of the mean squared distance from the true place.
     is_corner : (M,) bool
         Whether the curves of a node meet at an angle; else one goes smoothly over into the other.
+    through : (T, 2) int64
+        Curves that pass through a node without ending there: node and curve.
     loop : (K,) int64
         Closed outlines, of boundaries and occluding edges alone, are numbered from 0; -1 for all else.
     is_hole : (L,) bool
@@ -103,6 +105,7 @@ class Curves:
     node_position: np.ndarray
     node_std: np.ndarray
     is_corner: np.ndarray
+    through: np.ndarray
     loop: np.ndarray
     is_hole: np.ndarray
     spacing: np.ndarray
@@ -139,5 +142,6 @@ class Curves:
         return 2 * self.radius
 
     def curves_at(self, node: int) -> np.ndarray:
-        """Return the curves that end at a node, ascending."""
-        return np.flatnonzero((self.nodes == node).any(axis=1))
+        """Return the curves that meet at a node, ascending: those that end there and those that pass through."""
+        ending = np.flatnonzero((self.nodes == node).any(axis=1))
+        return np.union1d(ending, self.through[self.through[:, 0] == node, 1])

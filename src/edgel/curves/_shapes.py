@@ -56,7 +56,7 @@ def find_shapes(xyz: np.ndarray, points: EdgePoints) -> Shapes:
     second = measure(points.index, xyz, first.shape[alive], owned, points, smoothed.position, spacing)
     kept = np.flatnonzero(second.holds)
     runs, closed = _left(chains, pieces, paths, np.isin(owner, alive[kept]), points)
-    return Shapes(_take(second, kept), spacing[kept], _take_rows(owned, kept), runs, closed, smoothed)
+    return Shapes(_take(second, kept), spacing[kept], take_rows(owned, kept), runs, closed, smoothed)
 
 
 def _surest_first(measured: Measured, rows: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
@@ -83,10 +83,11 @@ def _rows_of(owner: np.ndarray, alive: np.ndarray, count: int) -> tuple[np.ndarr
     order = np.argsort(owner, kind="stable")
     order = order[owner[order] >= 0]
     start = np.concatenate([[0], np.cumsum(np.bincount(owner[order], minlength=count))])
-    return _take_rows((order, start), alive)
+    return take_rows((order, start), alive)
 
 
-def _take_rows(rows: tuple[np.ndarray, np.ndarray], kept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def take_rows(rows: tuple[np.ndarray, np.ndarray], kept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rows of some of several things, given as rows and where each thing's begin, in the same way."""
     values, start = rows
     number = np.diff(start)[kept]
     begin = np.concatenate([[0], np.cumsum(number)])
@@ -95,7 +96,7 @@ def _take_rows(rows: tuple[np.ndarray, np.ndarray], kept: np.ndarray) -> tuple[n
 
 
 def _take(measured: Measured, kept: np.ndarray) -> Measured:
-    points, start = _take_rows((measured.beside.points, measured.beside.start), kept)
+    points, start = take_rows((measured.beside.points, measured.beside.start), kept)
     beside = type(measured.beside)(points, start)
     names = ("shape", "fit", "covariance", "ranges", "holds")
     return Measured(*(getattr(measured, name)[kept] for name in names), beside)

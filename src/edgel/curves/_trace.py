@@ -11,6 +11,7 @@ from edgel.curves._assemble import assemble
 from edgel.curves._curves import Curves
 from edgel.curves._points import edge_points
 from edgel.curves._shapes import find_shapes
+from edgel.curves._strands import find_strands
 from edgel.edges import Edges
 
 
@@ -26,4 +27,5 @@ def trace(points: Any, edges: Edges) -> Curves:
     origin = finite.xyz.mean(axis=0)
     xyz = finite.xyz - origin
     found = edge_points(xyz, np.searchsorted(finite.rows, edges.index), edges, origin)
-    return assemble(find_shapes(xyz, found), xyz, found, edges, origin, cloud.crs)
+    strands = find_strands(find_shapes(xyz, found), xyz, found)
+    return assemble(strands, found, edges, origin, cloud.crs)
