@@ -19,7 +19,9 @@ POSITION_STD, RADIUS_STD, ANGLE_STD, TURN_STD = 18, 19, 20, 21
 """Standard deviations: of the place across the curve, the radius, the angle between the faces, and of the direction."""
 STATE = 22
 """See below."""
-FIT = 23
+RIPPLE = 23
+"""Of circles: how far the face that is most like a cylinder goes in and out on the way round, as flat walls do."""
+FIT = 24
 
 NONE, EDGE_ALONE, MEASURED = 0, 1, 2
 """States: no fit, a fit to edge points and one face, a fit to two faces."""

@@ -114,7 +114,7 @@ def _solve_face(system, right, h, turn, spread, covariance):
     if turn >= 3:
         inverse = _fit.inverse_of(system, 4)
         unknowns = inverse @ right
-        if abs(unknowns[3]) > max(4.0 * spread * math.sqrt(inverse[3, 3]), 0.008 * h):
+        if abs(unknowns[3]) > max(3.0 * spread * math.sqrt(inverse[3, 3]), 0.004 * h):
             covariance[:] = inverse * spread * spread
             return unknowns
     inverse = _fit.inverse_of(system, 3)

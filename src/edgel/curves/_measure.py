@@ -17,7 +17,7 @@ from edgel.curves._ranges import ranges_of
 from edgel.curves._rims import fit_rim_faces
 from edgel.edges import EdgeKind
 
-_SHORT = 2.4  # spacings: of faces too small for REACH
+_SHORT, _SHORTEST = 2.4, 1.5  # spacings: of faces too small for REACH
 _ROUGH = 0.15  # spacings: a face is that rough without the cloud being noisy
 _ROUGHER = 1.35  # times the noise of the cloud: no plane, cylinder or cone is rougher
 _COVERED = 0.2  # of the points that a face of full depth would have
@@ -25,6 +25,7 @@ _DEEP = 3.9  # spacings: full depth
 _TURN = 0.15  # sine of the angle between faces, at least
 _SMALLEST, _LARGEST = 1.5, 200.0  # spacings: of radii; a larger arc is told from a line by no cloud
 _LOOSE = 0.45  # spacings: edge points of a shape with one face scatter less
+_RIPPLE = 0.05  # spacings
 _SAGITTA = 1.5  # spacings: an arc that rises less may be a line
 
 
@@ -78,7 +79,7 @@ def measure(
     good = _holds(best, noise, spacing, outline)
     lines = np.zeros_like(shapes)
     run_slices(_as_lines, len(shapes), lines, *rows, position, size=64)
-    for reach, straight in ((_SHORT, False), (REACH, True), (_SHORT, True)):
+    for reach, straight in ((_SHORT, False), (REACH, True), (_SHORT, True), (_SHORTEST, False), (_SHORTEST, True)):
         curved = shapes[:, RADIUS] > 0
         which = np.flatnonzero((~good | _nearly_straight(best, spacing)) & (curved | (not straight)))
         if not len(which):
@@ -151,6 +152,8 @@ def _holds(fitted: _Attempt, noise: float, spacing: np.ndarray, outline: np.ndar
         smooth = (sigma < np.maximum(_ROUGH, _ROUGHER * noise)).all(axis=1)
         measured = smooth & (counts.min(axis=1) > _COVERED * _DEEP * length) & (np.abs(a * d - b * c) > _TURN)
         alone = outline & (np.nan_to_num(sigma).max(axis=1) < max(_LOOSE, 1.5 * noise))
+        # A wall that goes in and out as it goes round is several flat ones.
+        measured &= ~(fit[:, _fit.RIPPLE] > _RIPPLE * spacing)
     state = fit[:, _fit.STATE]
     plausible = (radius == 0) | ((radius > _SMALLEST * spacing) & (radius < _LARGEST * spacing))
     return plausible & ((state == _fit.MEASURED) & measured | (state == _fit.EDGE_ALONE) & alone)

@@ -21,6 +21,7 @@ spacings, the tilts by the radius."""
 TILT, CENTRE, SIZE, HEIGHT, TURN, BENT = 0, 2, 4, 5, 6, 8
 _SQUARE = 0.03  # of a face's normal: so near the axis or across it, a plane or a cylinder is meant
 _CORRELATED = 3.0  # edge points next to each other come from the same points of the cloud
+_CHANCE = 3.0  # deviations of an amplitude
 _FIRM = 1e-4  # weight of one point for what no point decides
 
 
@@ -74,10 +75,36 @@ def fit_rim_faces(shape, beside, xyz, rows, position, normals, h, reach, low, hi
         fit[_fit.NORMALS + 2 * k], fit[_fit.NORMALS + 2 * k + 1] = faces[k, 0], faces[k, 1]
         fit[_fit.INWARD + 2 * k], fit[_fit.INWARD + 2 * k + 1] = inward[k, 0], inward[k, 1]
         fit[_fit.BEND + k], fit[_fit.COUNTS + k], fit[_fit.SIGMA + k] = bend[k], number[k], spread[k]
+    fit[_fit.RIPPLE] = _ripple(shape, inside, xyz, h, reach, sigma, faces, inward, bend)
     place = covariance[SIZE, SIZE] + covariance[HEIGHT, HEIGHT] + covariance[2, 2] + covariance[3, 3]
     fit[_fit.POSITION_STD], fit[_fit.RADIUS_STD] = math.sqrt(place), math.sqrt(covariance[SIZE, SIZE])
     fit[_fit.ANGLE_STD] = math.sqrt(covariance[TURN, TURN] + covariance[TURN + 1, TURN + 1])
     fit[_fit.TURN_STD] = math.sqrt(covariance[0, 0] + covariance[1, 1])
+
+
+@kernel
+def _ripple(shape, inside, xyz, h, reach, sigma, faces, inward, bend):
+    """Return by how much more than chance a wall goes in and out three to six times on the way round."""
+    wall = 0 if abs(faces[0, 0]) >= abs(faces[1, 0]) else 1
+    tolerance = _fit.tolerance_of(_fit.ROUNDS, sigma, h) + 0.3 * h
+    sums, count, square = np.zeros((4, 2)), 0, 0.0
+    for i in inside:
+        a, b, along = in_profile(shape, xyz[i, 0], xyz[i, 1], xyz[i, 2])
+        k, off, _ = face_of(a, b, h, tolerance, reach, faces, inward, bend)
+        if k != wall:
+            continue
+        turn = along / shape[RADIUS]
+        count += 1
+        square += off * off
+        for m in range(4):
+            sums[m, 0] += off * math.cos((m + 3) * turn)
+            sums[m, 1] += off * math.sin((m + 3) * turn)
+    if count == 0:
+        return 0.0
+    most = 0.0
+    for m in range(4):
+        most = max(most, 2.0 * math.sqrt(sums[m, 0] ** 2 + sums[m, 1] ** 2) / count)
+    return max(most - _CHANCE * math.sqrt(2.0 * square) / count, 0.0)
 
 
 @kernel
@@ -186,7 +213,7 @@ def _solve(system, right, free, h, radius, covariance, judge):
         again = False
         if judge and attempt == 0:
             for m in range(size):
-                if which[m] >= BENT and abs(step[m]) < max(4.0 * math.sqrt(inverse[m, m]), 0.008):
+                if which[m] >= BENT and abs(step[m]) < max(2.5 * math.sqrt(inverse[m, m]), 0.004):
                     free[which[m]] = False
                     again = True
         if not again:

@@ -8,12 +8,13 @@ import numpy as np
 
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import knn
-from edgel.curves._corners import CORNER, PRIOR, REACH, Nodes
+from edgel.curves._corners import PRIOR, REACH, Nodes
 from edgel.curves._gather import on_shapes
 from edgel.curves._strands import Strands, ends_of, planes_at
 
 _STEP = 0.5  # spacings between the places of curves that are looked at
 _AROUND = 12
+_ALIKE = 0.77  # cosine between tangents: more alike, one curve goes over into the other
 _ASIDE = 0.5  # spacings: farther from the other curve is no end on it
 
 
@@ -47,7 +48,7 @@ def meet_through(strands: Strands, nodes: Nodes) -> tuple[Nodes, np.ndarray]:
     cosine = np.abs((ends.tangent[curve, end] * tangent).sum(axis=1))
     away = position - at
     aside = np.linalg.norm(away - (away * ends.tangent[curve, end]).sum(axis=1)[:, None] * ends.tangent[curve, end], axis=1)
-    good = (np.linalg.norm(away, axis=1) < REACH * h) & (aside < _ASIDE * h) & (asides < _ASIDE * h) & (cosine < CORNER)
+    good = (np.linalg.norm(away, axis=1) < REACH * h) & (aside < _ASIDE * h) & (asides < _ASIDE * h) & (cosine < _ALIKE)
     of_end = nodes.of_end.copy()
     of_end[curve[good], end[good]] = len(nodes.position) + np.arange(good.sum())
     joined = replace(
