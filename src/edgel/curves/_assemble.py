@@ -42,7 +42,8 @@ def assemble(strands: Strands, points: EdgePoints, edges: Edges, origin: np.ndar
     loop, is_hole = find_loops(strands, nodes, vertices, start, edge, points)
     radius = np.where(kinds >= CurveKind.ARC, strands.shape[:, RADIUS], np.nan)
     radius[kinds == CurveKind.POLYLINE] = np.nan
-    length = np.array([np.linalg.norm(np.diff(vertices[a:b], axis=0), axis=1).sum() for a, b in zip(start, start[1:], strict=False)])
+    paths = np.split(vertices, start[1:-1]) if len(strands) else []
+    length = np.array([np.linalg.norm(np.diff(path, axis=0), axis=1).sum() for path in paths], float)
     is_arc = np.isfinite(radius)
     length[is_arc] = (strands.along[:, 1] - strands.along[:, 0])[is_arc]
     return Curves(
@@ -89,7 +90,9 @@ def end_at_nodes(strands: Strands, nodes: Nodes) -> Strands:
         ending = np.flatnonzero((nodes.of_end[:, end] >= 0) & ~strands.is_run)
         at = along_of_all(shape[ending], nodes.position[nodes.of_end[ending, end]])
         around = 2 * np.pi * shape[ending, RADIUS]
-        before = strands.along[ending, end] * np.where(around > 0, shape[ending, RADIUS] / np.where(around > 0, strands.shape[ending, RADIUS], 1.0), 1.0)
+        before = strands.along[ending, end] * np.where(
+            around > 0, shape[ending, RADIUS] / np.where(around > 0, strands.shape[ending, RADIUS], 1.0), 1.0
+        )
         along[ending, end] = past(at, before - 0.5 * around, shape[ending])
     return replace(strands, shape=shape, along=along, covariance=covariance)
 

@@ -106,7 +106,7 @@ def _next(here, seed, length, dx, dy, dz, position, tangent, spacing, kind, neig
     """Return the point that follows, whether that is the seed, how far it is, and the direction there; -1 for none."""
     h = spacing[here]
     best, cost = -1, math.inf
-    around, back = False, math.inf
+    back = math.inf
     for j in neighbors[here]:
         if used[j] and j != seed:
             continue
@@ -132,7 +132,11 @@ def _next(here, seed, length, dx, dy, dz, position, tangent, spacing, kind, neig
         return -1, True, 0.0, dx, dy, dz
     if best < 0:
         return -1, False, 0.0, dx, dy, dz
-    x, y, z = position[best, 0] - position[here, 0], position[best, 1] - position[here, 1], position[best, 2] - position[here, 2]
+    x, y, z = (
+        position[best, 0] - position[here, 0],
+        position[best, 1] - position[here, 1],
+        position[best, 2] - position[here, 2],
+    )
     ahead = math.sqrt(x * x + y * y + z * z)
     ux, uy, uz = x / ahead, y / ahead, z / ahead
     # What lies beside the way from here to there belongs to it.

@@ -1,4 +1,4 @@
-"""From where to where shapes are edges: where their edge points lie, and where both faces meet though none was found."""
+"""Where along shapes there are edges: where edge points lie, and where both faces meet though none was found."""
 
 from __future__ import annotations
 
@@ -106,7 +106,9 @@ def _count_sides(shape, fit, beside, xyz, h, low, width, around, sides):
         best, which = np.inf, -1
         for k in range(2):
             into = fit[_fit.INWARD + 2 * k] * a + fit[_fit.INWARD + 2 * k + 1] * b
-            off = abs(fit[_fit.NORMALS + 2 * k] * a + fit[_fit.NORMALS + 2 * k + 1] * b - fit[_fit.BEND + k] * into * into)
+            off = abs(
+                fit[_fit.NORMALS + 2 * k] * a + fit[_fit.NORMALS + 2 * k + 1] * b - fit[_fit.BEND + k] * into * into
+            )
             tolerance = min(max(3.0 * fit[_fit.SIGMA + k], 0.2 * h), 0.8 * h)
             if 0.3 * h < into < _DEPTH * h and off < tolerance and off < best:
                 best, which = off, k

@@ -34,10 +34,12 @@ class Beside:
     start: np.ndarray
 
 
-def gather(index: NeighborIndex, xyz: np.ndarray, shapes: np.ndarray, ranges: np.ndarray, spacing: np.ndarray) -> Beside:
+def gather(
+    index: NeighborIndex, xyz: np.ndarray, shapes: np.ndarray, ranges: np.ndarray, spacing: np.ndarray
+) -> Beside:
     """Find the points (N, 3) of an index that are beside shapes (K, 13), over ranges (K, 2) along them."""
     count = len(shapes)
-    low, high, whole = widened(shapes, ranges, spacing)
+    low, high, _ = widened(shapes, ranges, spacing)
     number = np.maximum(np.ceil((high - low) / (_STEP * spacing)).astype(np.int64), 1)
     start = np.concatenate([[0], np.cumsum(number)])
     owner = np.repeat(np.arange(count), number)

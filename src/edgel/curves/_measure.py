@@ -68,8 +68,8 @@ def measure(
     """Fit the faces beside shapes (K, 13), and tell which fits hold.
 
     Takes the edge points of each shape (as rows, and where each shape's begin), all edge points and their smoothed
-    places (E, 3), and the spacing (K,) of the cloud at the shapes. A shape whose faces are too rough is tried on less of
-    them, since small parts have small faces, and an arc that is no arc as a line.
+    places (E, 3), and the spacing (K,) of the cloud at the shapes. A shape whose faces are too rough is tried on less
+    of them, since small parts have small faces, and an arc that is no arc as a line.
     """
     ranges = ranges_of(shapes, rows, position)
     beside = gather(index, xyz, shapes, ranges, spacing)
@@ -88,7 +88,9 @@ def measure(
         along = ranges_of(begin, rows, position) if straight else ranges
         other = _attempt(begin, which, reach, beside, xyz, rows, points, position, spacing, along)
         holds = _holds(other, noise, spacing[which], outline[which])
-        better = holds & (~good[which] | (straight & (_rough(other) < 1.15 * _rough(best)[which] + 0.02 * spacing[which])))
+        better = holds & (
+            ~good[which] | (straight & (_rough(other) < 1.15 * _rough(best)[which] + 0.02 * spacing[which]))
+        )
         for name in ("shape", "fit", "covariance", "ranges"):
             getattr(best, name)[which[better]] = getattr(other, name)[better]
         good[which[better]] = True
@@ -179,7 +181,22 @@ def _as_lines(start, stop, lines, rows, first, position):
 
 @kernel
 def _fit_faces(
-    start, stop, which, reach, shape, beside, begin, xyz, rows, first, position, normals, spacing, ranges, fit, covariance
+    start,
+    stop,
+    which,
+    reach,
+    shape,
+    beside,
+    begin,
+    xyz,
+    rows,
+    first,
+    position,
+    normals,
+    spacing,
+    ranges,
+    fit,
+    covariance,
 ):
     for q in range(start, stop):
         k = which[q]

@@ -65,7 +65,9 @@ def edge_points(xyz: np.ndarray, points: np.ndarray, edges: Edges, origin: np.nd
     spacing[spacing <= 0] = float(np.median(known)) if len(known) else 1.0
     parts = (edges.position - origin, edges.direction, edges.normals)
     position, direction, normals = (np.ascontiguousarray(part[rows], np.float64) for part in parts)
-    return EdgePoints(rows, position, direction, normals, kind[rows], edges.convex[rows], edges.strength[rows], spacing, index)
+    return EdgePoints(
+        rows, position, direction, normals, kind[rows], edges.convex[rows], edges.strength[rows], spacing, index
+    )
 
 
 @kernel

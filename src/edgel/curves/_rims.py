@@ -48,9 +48,7 @@ def fit_rim_faces(shape, beside, xyz, rows, position, normals, h, reach, low, hi
         tolerance = _fit.tolerance_of(turn, sigma, h)
         if turn == 4:
             free[BENT:] = True
-        _collect(
-            shape, inside, xyz, h, reach, tolerance, faces, inward, bend, spread, system, right, number
-        )
+        _collect(shape, inside, xyz, h, reach, tolerance, faces, inward, bend, spread, system, right, number)
         for k in range(2):
             if number[k] < _fit.LEAST:
                 faces[k] = 0.0

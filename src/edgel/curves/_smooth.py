@@ -48,7 +48,7 @@ class Smoothed:
 def smooth(position: np.ndarray, direction: np.ndarray, spacing: np.ndarray, rounds: int = 2) -> Smoothed:
     """Move edge points (E, 3) across their tangents (E, 3), NaN where unknown, onto parabolas through their neighbours.
 
-    `spacing` (E,) is that of the cloud there. The curve keeps its curvature: the parabola's vertex is taken, not a mean.
+    `spacing` (E,) is that of the cloud there. The curve keeps its curvature: it is the parabola's vertex, no mean.
     """
     count = len(position)
     neighbors = knn(build_index(position), position, min(NEIGHBORS, count)).points

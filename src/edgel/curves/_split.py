@@ -54,7 +54,19 @@ def split(chains: Chains, position: np.ndarray, spacing: np.ndarray, spread: np.
     slots = np.concatenate([[0], np.cumsum(room)])
     cuts, shape = np.zeros((slots[-1], 2), np.int64), np.zeros((slots[-1], SHAPE))
     fits, counts = np.zeros(slots[-1], np.bool_), np.zeros(len(chains), np.int64)
-    arguments = (chains.points, chains.start, chains.closed, position, spacing, spread, slots, cuts, shape, fits, counts)
+    arguments = (
+        chains.points,
+        chains.start,
+        chains.closed,
+        position,
+        spacing,
+        spread,
+        slots,
+        cuts,
+        shape,
+        fits,
+        counts,
+    )
     run_slices(_split_chains, len(chains), *arguments, size=16)
     chain = np.repeat(np.arange(len(chains)), counts)
     rows = np.concatenate([slots[:-1][i] + np.arange(counts[i]) for i in range(len(chains))] or [np.empty(0, np.int64)])
@@ -78,7 +90,9 @@ def _split_chains(start, stop, points, begin, closed, position, spacing, spread,
         number = _merge(rows, position, h, sigma, cuts[slot:], shape[slot:], closed[chain])
         if closed[chain] and number > 1:  # begin at a border, so that no piece is cut where the walk began
             shift = cuts[slot, 1]
-            number = _merge(np.concatenate((rows[shift:], rows[:shift])), position, h, sigma, cuts[slot:], shape[slot:], False)
+            number = _merge(
+                np.concatenate((rows[shift:], rows[:shift])), position, h, sigma, cuts[slot:], shape[slot:], False
+            )
         counts[chain] = number
         for k in range(number):
             a, b = cuts[slot + k, 0] + shift, cuts[slot + k, 1] + shift

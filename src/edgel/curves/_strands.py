@@ -110,7 +110,9 @@ def find_strands(shapes: Shapes, xyz: np.ndarray, points: EdgePoints) -> Strands
     )
 
 
-def _evident(fit: np.ndarray, rows: tuple[np.ndarray, np.ndarray], strength: np.ndarray, length: np.ndarray) -> np.ndarray:
+def _evident(
+    fit: np.ndarray, rows: tuple[np.ndarray, np.ndarray], strength: np.ndarray, length: np.ndarray
+) -> np.ndarray:
     """Tell for which shapes (K,) edge points speak, over all their lengths (K,) in spacings."""
     number = np.maximum(np.diff(rows[1]), 1)
     total = np.add.reduceat(strength[rows[0]], rows[1][:-1]) if len(rows[0]) else np.empty(0)
@@ -175,7 +177,7 @@ def ends_of(strands: Strands) -> Ends:
 def planes_at(
     strands: Strands, which: np.ndarray, along: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return places, tangents, and both planes with their standard deviations, so far along some strands with shapes."""
+    """Return places, tangents, and both planes with their deviations, so far along some strands with shapes."""
     shape, fit, h = strands.shape[which], strands.fit[which], strands.spacing[which]
     u, v, w = shape[:, 3:6], shape[:, 6:9], shape[:, 9:12]
     is_line = shape[:, RADIUS] == 0

@@ -28,10 +28,14 @@ def meet_through(strands: Strands, nodes: Nodes) -> tuple[Nodes, np.ndarray]:
     free = np.flatnonzero(((nodes.of_end < 0) & ends.is_open[:, None]).ravel())
     if not len(free) or not len(shaped):
         return nodes, np.empty((0, 2), np.int64)
-    number = np.maximum(np.ceil((strands.along[shaped, 1] - strands.along[shaped, 0]) / (_STEP * strands.spacing[shaped])), 1)
+    number = np.maximum(
+        np.ceil((strands.along[shaped, 1] - strands.along[shaped, 0]) / (_STEP * strands.spacing[shaped])), 1
+    )
     owner = np.repeat(shaped, number.astype(np.int64))
     first = np.concatenate([[0], np.cumsum(number)[:-1]]).astype(np.int64)
-    step = (np.arange(len(owner)) - np.repeat(first, number.astype(np.int64)) + 0.5) / np.repeat(number, number.astype(np.int64))
+    step = (np.arange(len(owner)) - np.repeat(first, number.astype(np.int64)) + 0.5) / np.repeat(
+        number, number.astype(np.int64)
+    )
     along = strands.along[owner, 0] + step * (strands.along[owner, 1] - strands.along[owner, 0])
     places = on_shapes(strands.shape[owner], along)
     curve, end = free // 2, free % 2
@@ -47,7 +51,9 @@ def meet_through(strands: Strands, nodes: Nodes) -> tuple[Nodes, np.ndarray]:
     h = strands.spacing[curve]
     cosine = np.abs((ends.tangent[curve, end] * tangent).sum(axis=1))
     away = position - at
-    aside = np.linalg.norm(away - (away * ends.tangent[curve, end]).sum(axis=1)[:, None] * ends.tangent[curve, end], axis=1)
+    aside = np.linalg.norm(
+        away - (away * ends.tangent[curve, end]).sum(axis=1)[:, None] * ends.tangent[curve, end], axis=1
+    )
     good = (np.linalg.norm(away, axis=1) < REACH * h) & (aside < _ASIDE * h) & (asides < _ASIDE * h) & (cosine < _ALIKE)
     of_end = nodes.of_end.copy()
     of_end[curve[good], end[good]] = len(nodes.position) + np.arange(good.sum())
