@@ -1,4 +1,4 @@
-"""The command line: ``edgel detect``, ``view``, ``render``, ``lines``, ``normals``, ``info``, ``convert`` and ``demo``."""
+"""The command line: ``edgel detect``, ``view``, ``render``, ``lines``, ``normals``, ``info``, ``convert``, ``demo``."""
 
 from __future__ import annotations
 

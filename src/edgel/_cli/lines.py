@@ -10,7 +10,6 @@ from typing import Annotated, Any
 
 import numpy as np
 
-import edgel
 from edgel._cli import files, jobs, options
 from edgel._cli.batch import Talk, run_jobs
 from edgel._cli.errors import ExitCode, Failure, exit_codes, failing_as
@@ -21,7 +20,7 @@ from edgel._cli.output import count, time_rows
 from edgel._cli.units import unit_of
 from edgel._cli.where import Where
 from edgel._stages import Stages
-from edgel.curves import FAINT, WRITERS, Curves, CurveKind, measures, simplify, trace, write
+from edgel.curves import FAINT, WRITERS, CurveKind, Curves, measures, simplify, trace, write
 
 HELP = """Draw the edges of clouds as lines, arcs and circles, measured on the faces beside them.
 

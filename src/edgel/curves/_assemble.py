@@ -135,7 +135,7 @@ def _held(
 
 def _long_enough(strands: Strands, nodes: Nodes) -> np.ndarray:
     length = strands.along[:, 1] - strands.along[:, 0]
-    for run in np.flatnonzero(strands.is_run):
+    for run in np.flatnonzero(strands.is_run).tolist():
         length[run] = np.linalg.norm(np.diff(strands.path_of(run), axis=0), axis=1).sum()
     meets = (nodes.of_end >= 0).any(axis=1)
     return (length > _SHORT * strands.spacing) | (meets & (length > _SHORTEST * strands.spacing))
@@ -178,10 +178,12 @@ def _vertices(strands: Strands, nodes: Nodes) -> tuple[np.ndarray, np.ndarray]:
             path = on_shapes(np.repeat(strands.shape[k : k + 1], steps + 1, axis=0), along)
             if strands.closed[k]:
                 path[-1] = path[0]
-        if ends[0] is not None:
-            path = np.concatenate([ends[0][None], path[1 if radius >= 0 else 0 :]])
-        if ends[1] is not None:
-            path = np.concatenate([path[: -1 if radius >= 0 else None], ends[1][None]])
+        # Lines run from node to node; arcs were fitted again to pass through theirs, and are not bent.
+        is_line = radius == 0
+        if ends[0] is not None and not radius > 0:
+            path = np.concatenate([ends[0][None], path[1 if is_line else 0 :]])
+        if ends[1] is not None and not radius > 0:
+            path = np.concatenate([path[: -1 if is_line else None], ends[1][None]])
         paths.append(path)
     start = np.concatenate([[0], np.cumsum([len(path) for path in paths])]).astype(np.int64)
     return np.concatenate(paths) if paths else np.empty((0, 3)), start

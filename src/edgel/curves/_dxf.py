@@ -43,7 +43,7 @@ def _new_document() -> Any:
     return ezdxf.new("R2010")  # pyright: ignore[reportPrivateImportUsage]
 
 
-def _add(space: Any, curves: Curves, curve: int, attributes: dict[str, str]) -> None:
+def _add(space: Any, curves: Curves, curve: int, attributes: dict[str, Any]) -> None:
     from ezdxf.math import OCS
 
     path, kind = curves.points_of(curve), curves.kind[curve]

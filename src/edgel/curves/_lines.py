@@ -36,7 +36,8 @@ def fit_line_faces(shape, beside, xyz, rows, position, normals, h, reach, low, h
         profile[q, 0], profile[q, 1] = x[inside[q]], y[inside[q]]
     choose_sides(profile, h, 0.8 * h, faces, inward)
     x0 = x1 = y0 = y1 = 0.0
-    sigma = 0.3 * h
+    sigma, both = 0.3 * h, False
+    dx = dy = ex = ey = 0.0
     system, right = np.zeros((2, 4, 4)), np.zeros((2, 4))
     spread, number, tilt = np.zeros(2), np.zeros(2), np.zeros(2)
     covariance = np.zeros((2, 4, 4))

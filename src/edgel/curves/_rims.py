@@ -21,6 +21,7 @@ spacings, the tilts by the radius."""
 TILT, CENTRE, SIZE, HEIGHT, TURN, BENT = 0, 2, 4, 5, 6, 8
 _SQUARE = 0.03  # of a face's normal: so near the axis or across it, a plane or a cylinder is meant
 _CORRELATED = 3.0  # edge points next to each other come from the same points of the cloud
+_SURELY, _STRAIGHT = 2.5, 0.004  # deviations, and 1 / spacings: a face bends that bends by more
 _CHANCE = 3.0  # deviations of an amplitude
 _FIRM = 1e-4  # weight of one point for what no point decides
 
@@ -42,7 +43,7 @@ def fit_rim_faces(shape, beside, xyz, rows, position, normals, h, reach, low, hi
     number, spread = np.zeros(2), np.full(2, 0.3 * h)
     free = np.ones(UNKNOWNS, np.bool_)
     free[BENT:] = False
-    sigma = 0.3 * h
+    sigma, both = 0.3 * h, False
     last = _fit.ROUNDS + 2
     for turn in range(last):
         tolerance = _fit.tolerance_of(turn, sigma, h)
@@ -196,26 +197,16 @@ def _solve(system, right, free, h, radius, covariance, judge):
     for m in range(UNKNOWNS):
         for n in range(m):
             system[n, m] = system[m, n]
-    for attempt in range(2):
-        which = np.flatnonzero(free)
-        size = len(which)
-        inner, side = np.empty((size, size)), np.empty(size)
-        for m in range(size):
-            side[m] = right[which[m]]
-            for n in range(size):
-                inner[m, n] = system[which[m], which[n]]
-            # What no point decides stays: a tilt or a turn of a tenth, a step of a spacing, has the weight of a point.
-            inner[m, m] += _FIRM * system[SIZE, SIZE] + 1.0 / (1.0 if which[m] < TURN else 0.1)
-        inverse = _fit.inverse_of(inner, size)
-        step = inverse @ side
+    which, inverse, step = _solve_free(system, right, free)
+    if judge:
         again = False
-        if judge and attempt == 0:
-            for m in range(size):
-                if which[m] >= BENT and abs(step[m]) < max(2.5 * math.sqrt(inverse[m, m]), 0.004):
-                    free[which[m]] = False
-                    again = True
-        if not again:
-            break
+        for m in range(len(which)):
+            if which[m] >= BENT and abs(step[m]) < max(_SURELY * math.sqrt(inverse[m, m]), _STRAIGHT):
+                free[which[m]] = False
+                again = True
+        if again:
+            which, inverse, step = _solve_free(system, right, free)
+    size = len(which)
     right[:] = 0.0
     covariance[:] = 0.0
     scale = np.full(UNKNOWNS, h)
@@ -226,6 +217,22 @@ def _solve(system, right, free, h, radius, covariance, judge):
         right[which[m]] = step[m]
         for n in range(size):
             covariance[which[m], which[n]] = inverse[m, n] * scale[which[m]] * scale[which[n]]
+
+
+@kernel
+def _solve_free(system, right, free):
+    """Return which unknowns are free, the inverse of their equations, and their solution."""
+    which = np.flatnonzero(free)
+    size = len(which)
+    inner, side = np.empty((size, size)), np.empty(size)
+    for m in range(size):
+        side[m] = right[which[m]]
+        for n in range(size):
+            inner[m, n] = system[which[m], which[n]]
+        # What no point decides stays: a step of a spacing, or a tilt or turn of a third, weighs as one deviation.
+        inner[m, m] += _FIRM * system[SIZE, SIZE] + 1.0 / (1.0 if which[m] < TURN else 0.1)
+    inverse = _fit.inverse_of(inner, size)
+    return which, inverse, inverse @ side
 
 
 @kernel

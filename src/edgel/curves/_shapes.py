@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -99,7 +99,7 @@ def _take(measured: Measured, kept: np.ndarray) -> Measured:
     points, start = take_rows((measured.beside.points, measured.beside.start), kept)
     beside = type(measured.beside)(points, start)
     names = ("shape", "fit", "covariance", "ranges", "holds")
-    return Measured(*(getattr(measured, name)[kept] for name in names), beside)
+    return replace(measured, beside=beside, **{name: getattr(measured, name)[kept] for name in names})
 
 
 def _left(

@@ -51,7 +51,8 @@ def smooth(position: np.ndarray, direction: np.ndarray, spacing: np.ndarray, rou
     `spacing` (E,) is that of the cloud there. The curve keeps its curvature: it is the parabola's vertex, no mean.
     """
     count = len(position)
-    neighbors = knn(build_index(position), position, min(NEIGHBORS, count)).points
+    none = np.empty((0, 1), np.int64)
+    neighbors = knn(build_index(position), position, min(NEIGHBORS, count)).points if count else none
     known = np.where(np.isfinite(direction), direction, 0.0)
     tangent = np.zeros_like(position)
     run_slices(_fill_tangents, count, position, known, spacing, neighbors, tangent)

@@ -164,7 +164,7 @@ def ends_of(strands: Strands) -> Ends:
         parts = planes_at(strands, shaped, strands.along[shaped, end])
         place[shaped, end], tangent[shaped, end], normals[shaped, end], std[shaped, end] = parts
         tangent[shaped, end] *= sign
-        for run in runs:
+        for run in runs.tolist():
             path = strands.path_of(run)[:: -1 if end == 0 else 1]
             away = path[-1] - path[-min(4, len(path))]
             away /= np.linalg.norm(away)

@@ -50,7 +50,7 @@ def trace(points: Any, edges: Edges) -> Curves:
     >>> roof = np.c_[x.ravel(), y.ravel(), -abs(x.ravel() - 20)]
     >>> lines = edgel.curves.trace(roof, edgel.detect(roof, kinds="crease"))
     >>> len(lines), lines.length.round(1).tolist()
-    (1, [39.0])
+    (1, [39.1])
     """
     cloud = as_cloud(points)
     if len(cloud) != edges.num_points:
