@@ -14,6 +14,7 @@ from edgel.curves._gather import on_shapes
 from edgel.curves._loops import find_loops
 from edgel.curves._points import EdgePoints
 from edgel.curves._strands import Strands, along_of_all, ends_of, past
+from edgel.curves._tangent import touch
 from edgel.curves._through import meet_through
 from edgel.edges import EdgeKind, Edges
 
@@ -27,7 +28,7 @@ _ORDER = (EdgeKind.CREASE, EdgeKind.BOUNDARY, EdgeKind.OCCLUDING, EdgeKind.COLOR
 
 def assemble(strands: Strands, points: EdgePoints, edges: Edges, origin: np.ndarray, crs: str | None) -> Curves:
     """Make curves of strands."""
-    nodes = meet(ends_of(strands), strands.shape, strands.spacing)
+    nodes = touch(strands, meet(ends_of(strands), strands.shape, strands.spacing))
     nodes, through = meet_through(strands, nodes)
     strands = end_at_nodes(strands, nodes)
     kept = np.flatnonzero(_long_enough(strands, nodes))

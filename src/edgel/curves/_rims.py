@@ -22,7 +22,7 @@ TILT, CENTRE, SIZE, HEIGHT, TURN, BENT = 0, 2, 4, 5, 6, 8
 _SQUARE = 0.03  # of a face's normal: so near the axis or across it, a plane or a cylinder is meant
 _CORRELATED = 3.0  # edge points next to each other come from the same points of the cloud
 _SURELY, _STRAIGHT = 2.5, 0.004  # deviations, and 1 / spacings: a face bends that bends by more
-_CHANCE = 3.0  # deviations of an amplitude
+_CHANCE = 2.2  # deviations of an amplitude
 _FIRM = 1e-4  # weight of one point for what no point decides
 
 

@@ -84,7 +84,7 @@ def _split_chains(start, stop, points, begin, closed, position, spacing, spread,
         for i in rows:
             h, noise = h + spacing[i], noise + spread[i]
         h, noise = h / count, noise / count
-        sigma = max(_FLOOR * h, 0.35 * noise)
+        sigma = max(_FLOOR * h, 0.5 * noise)
         slot = slots[chain]
         shift = 0
         number = _merge(rows, position, h, sigma, cuts[slot:], shape[slot:], closed[chain])

@@ -14,7 +14,7 @@ from edgel.curves._strands import Strands, ends_of, planes_at
 
 _STEP = 0.5  # spacings between the places of curves that are looked at
 _AROUND = 12
-_ALIKE = 0.77  # cosine between tangents: more alike, one curve goes over into the other
+_ALIKE = 0.64  # cosine between tangents: more alike, one curve goes over into the other
 _ASIDE = 0.5  # spacings: farther from the other curve is no end on it
 
 
