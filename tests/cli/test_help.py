@@ -126,6 +126,7 @@ def test_all_that_json_says_is_documented(folder, monkeypatch):
     commands = {
         "detect": ["scan.ply"],
         "render": ["scan.ply", "-o", "j.png", "--size", "320x240"],
+        "lines": ["scan.ply", "-o", "j.csv"],
         "normals": ["scan.ply", "-o", "j.ply"],
         "info": ["scan.ply"],
         "convert": ["scan.ply", "j.ply"],

@@ -48,3 +48,12 @@ def test_an_unknown_extension_is_wrong_usage(roof, tmp_path):
     assert result.exit_code != 0
     assert ".dxf" in result.output
     assert not (tmp_path / "a.dwg").exists()
+
+
+def test_the_report_shows_measures_on_the_picture(roof, tmp_path):
+    result = run("lines", roof, "-o", tmp_path / "a.csv", "--kinds", "crease", "--report", tmp_path / "page", "--json")
+    assert result.exit_code == 0, result.output
+    page = (tmp_path / "page" / "lines.html").read_text()
+    assert page.count("<svg") == 3
+    told = json.loads(result.stdout)
+    assert f"{told['length']:.4g}</text>" in page

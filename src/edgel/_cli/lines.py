@@ -19,6 +19,7 @@ from edgel._cli.outcome import Told, cautions, notices
 from edgel._cli.output import count, time_rows
 from edgel._cli.units import unit_of
 from edgel._cli.where import Where
+from edgel._report.lines import write_lines_page
 from edgel._stages import Stages
 from edgel.curves import FAINT, WRITERS, CurveKind, Curves, measures, simplify, trace, write
 
@@ -31,11 +32,11 @@ standard deviations). Lengths are in the cloud's unit. DXF and maps need the ext
 
 \b
 Examples:
-  edgel lines part.ply -o drawing.dxf
-  edgel lines part.ply -o measures.csv
-  edgel lines tile.laz -o ridges.gpkg --where "classification == 6"
-  edgel lines tile.laz -o breaklines.gpkg --simplify 0.2
-  edgel lines part.ply -o top.svg --view top --unit mm
+  edgel lines scan.ply -o drawing.dxf
+  edgel lines scan.ply -o measures.csv --report report
+  edgel lines scan.las -o ridges.gpkg --where "classification == 6"
+  edgel lines scan.las -o breaklines.geojson --simplify 0.2
+  edgel lines scan.ply -o top.svg --view top --unit mm
 """
 _GROUP = "Drawing"
 
@@ -69,6 +70,15 @@ def lines(
             default="none is left out",
         ),
     ] = None,
+    report: Annotated[
+        str | None,
+        options.own(
+            "--report",
+            text="Write a page with the measures on the picture into this folder, of several into folders in it.",
+            group=options.OUTPUT,
+            metavar="DIR",
+        ),
+    ] = None,
     view: Annotated[
         str, options.option(write, "view", "Of an SVG: top, front or right.", metavar="NAME", group=_GROUP)
     ] = options.default_of(write, "view"),
@@ -94,7 +104,7 @@ def lines(
         drawing: dict[str, Any] = {"view": view, "unit": unit, "scale": scale}
         reading = files.Reading(intrinsics, columns, sample_mesh)
         wanted = _Wanted(reading, condition, check_options("auto", given), tolerance, drawing)
-        todo = jobs.plan(sources, reading, output=output, known=list(WRITERS), clobber=clobber)
+        todo = jobs.plan(sources, reading, output=output, known=list(WRITERS), report=report, clobber=clobber)
         run_jobs(todo, partial(_draw, wanted), Talk("lines", as_json, quiet, debug), workers=workers)
 
 
@@ -124,8 +134,17 @@ def _draw(wanted: _Wanted, job: Job, progress: Callable[[str], None]) -> Told:
         jobs.make_folder(job)
         files.check_clobber(output, no_clobber=job.no_clobber)
         _write(output, curves, wanted.drawing)
-    unit = unit_of(found.cloud, job.source)
-    facts = {"input": job.source, "output": output, "unit": unit, "notices": notices(found.cloud)}
+    unit, page = unit_of(found.cloud, job.source), None
+    if job.report is not None:
+        with stages("report"), failing_as(ExitCode.OUTPUT, job.report):
+            page = write_lines_page(job.report, job.name, curves, unit)
+    facts = {
+        "input": job.source,
+        "output": output,
+        "report": None if page is None else str(page),
+        "unit": unit,
+        "notices": notices(found.cloud),
+    }
     facts |= {"curves": len(curves), "corners": int(curves.is_corner.sum()), "loops": len(curves.is_hole)}
     facts |= {"kinds": curves.count_kinds(), "length": float(curves.length.sum()), "seconds": stages.seconds}
     nothing = [] if len(curves) else [(f"{job.name}: no lines were found; the file is valid and empty", "yellow")]
@@ -135,7 +154,7 @@ def _draw(wanted: _Wanted, job: Job, progress: Callable[[str], None]) -> Told:
         rows=[*_rows(curves, unit), *time_rows(stages.seconds)],
         headline=f"{job.name}: {count(len(curves))} curves -> {output}",
         remarks=[*cautions(job, found.cloud, {}), *nothing],
-        written=[f"{output}: {count(len(curves))} curves"],
+        written=[f"{output}: {count(len(curves))} curves", *([] if page is None else [f"{page}: the report"])],
     )
 
 

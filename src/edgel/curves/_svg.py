@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -32,8 +33,14 @@ def write(path: str | os.PathLike[str], curves: Curves, *, view: str, unit: str,
         raise ValueError(f"unit: expected one of {', '.join(UNITS)}, got {unit!r}")
     if not (scale > 0 and math.isfinite(scale)):
         raise ValueError(f"scale: expected a number above 0, got {scale}")
+    text = drawing(curves, view, UNITS[unit] * scale)
+    with replacing(path) as file:
+        file.write(text.encode())
+
+
+def drawing(curves: Curves, view: str, factor: float, labels: Sequence[str] = ()) -> str:
+    """Return an SVG in which a unit of the cloud has so many millimetres, with a label at the middle of each curve."""
     right, up = VIEWS[view]
-    factor = UNITS[unit] * scale
     flat = curves.vertices[:, [right, up]]
     low, high = (flat.min(axis=0), flat.max(axis=0)) if len(flat) else (np.zeros(2), np.zeros(2))
     width, height = (high - low) * factor + 2 * _MARGIN
@@ -49,13 +56,16 @@ def write(path: str | os.PathLike[str], curves: Curves, *, view: str, unit: str,
     ]
     for curve in range(len(curves)):
         color = _COLORS.get(EdgeKind(int(curves.edge[curve])), "#666")
+        path = on_paper(curves.points_of(curve))
         if curves.kind[curve] == CurveKind.CIRCLE and abs(curves.direction[curve, depth]) > 1 - 1e-6:
             x, y = on_paper(curves.centre[curve])
             lines.append(
                 f'<circle cx="{x:.5f}" cy="{y:.5f}" r="{curves.radius[curve] * factor:.5f}" stroke="{color}"/>'
             )
         else:
-            places = " ".join(f"{x:.5f},{y:.5f}" for x, y in on_paper(curves.points_of(curve)))
+            places = " ".join(f"{x:.5f},{y:.5f}" for x, y in path)
             lines.append(f'<polyline points="{places}" stroke="{color}"/>')
-    with replacing(path) as file:
-        file.write(("\n".join([*lines, "</svg>"]) + "\n").encode())
+        if labels and labels[curve]:
+            x, y = path[len(path) // 2] if len(path) > 2 else path.mean(axis=0)
+            lines.append(f'<text x="{x:.2f}" y="{y:.2f}" font-size="3" fill="{color}">{labels[curve]}</text>')
+    return "\n".join([*lines, "</svg>"]) + "\n"
