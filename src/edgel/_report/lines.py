@@ -15,8 +15,8 @@ _WIDE = 240.0  # millimetres
 _LABELLED = 60  # curves: more labels cover each other, the longest and the circles have theirs
 _COLUMNS = ("name", "edge", "length", "length_std", "diameter", "diameter_std", "angle", "angle_std", "position_std")
 _STYLE = (
-    "body{font:15px/1.5 system-ui,sans-serif;max-width:1000px;margin:2em auto;padding:0 1em}svg{max-width:100%;height:auto;"
-    "border:1px solid #ddd}table{border-collapse:collapse;font-size:13px}td,th{padding:.2em .7em;text-align:right;"
+    "body{font:15px/1.5 system-ui,sans-serif;max-width:1000px;margin:2em auto;padding:0 1em}"
+    "svg{max-width:100%;height:auto;border:1px solid #ddd}table{border-collapse:collapse;font-size:13px}td,th{padding:.2em .7em;text-align:right;"
     "border-bottom:1px solid #eee}td:first-child,th:first-child{text-align:left}"
 )
 
@@ -28,10 +28,9 @@ def write_lines_page(folder: str | Path, title: str, curves: Curves, unit: str |
     extent = np.ptp(curves.vertices, axis=0) if len(curves) else np.ones(3)
     labels = _labels(curves)
     parts = [f"<h1>Lines of {html.escape(title)}</h1>"]
-    parts.append(
-        f"<p>{html.escape(repr(curves))}. Lengths in {html.escape(unit or 'the unit of the cloud')}, angles in degrees, "
-        "each with its standard deviation.</p>"
-    )
+    lengths = html.escape(unit or "the unit of the cloud")
+    told = f"Lengths in {lengths}, angles in degrees, with standard deviations."
+    parts.append(f"<p>{html.escape(repr(curves))}. {told}</p>")
     for view, axes in VIEWS.items():
         factor = _WIDE / max(float(extent[list(axes)].max()), 1e-300)
         parts += [f"<h2>{view.capitalize()}</h2>", drawing(curves, view, factor, labels)]
@@ -42,7 +41,8 @@ def write_lines_page(folder: str | Path, title: str, curves: Curves, unit: str |
     for row in zip(*(table[name].tolist() for name in _COLUMNS), strict=True):
         parts.append("<tr>" + "".join(f"<td>{_shown(value)}</td>" for value in row) + "</tr>")
     parts.append("</table>")
-    head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{html.escape(title)}</title><style>{_STYLE}</style>'
+    head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{html.escape(title)}</title>'
+    head += f"<style>{_STYLE}</style>"
     with replacing(page) as file:
         file.write((head + "\n".join(parts) + "</html>\n").encode())
     return page

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -44,16 +45,20 @@ def write(path: str | os.PathLike[str], curves: Curves) -> None:
     shapes = [shapely.LineString(curves.points_of(curve)) for curve in range(len(curves))]
     Path(path).unlink(missing_ok=True)  # GDAL would add a layer to the old file
     more: dict[str, Any] = {} if suffix == ".geojson" else {"layer": "curves" if suffix == ".gpkg" else Path(path).stem}
-    pyogrio.raw.write(
-        os.fspath(path),
-        geometry=np.array([shapely.to_wkb(shape, output_dimension=3) for shape in shapes], object),
-        field_data=[np.asarray(values, object) if values.dtype.kind == "U" else values for values in table.values()],
-        fields=list(table),
-        geometry_type="LineString Z",
-        crs=curves.crs,
-        driver=_DRIVERS[suffix],
-        **more,
-    )
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "'crs' was not provided")  # the cloud has none to give
+        pyogrio.raw.write(
+            os.fspath(path),
+            geometry=np.array([shapely.to_wkb(shape, output_dimension=3) for shape in shapes], object),
+            field_data=[
+                np.asarray(values, object) if values.dtype.kind == "U" else values for values in table.values()
+            ],
+            fields=list(table),
+            geometry_type="LineString Z",
+            crs=curves.crs,
+            driver=_DRIVERS[suffix],
+            **more,
+        )
 
 
 def _libraries() -> tuple[Any, Any]:
