@@ -16,7 +16,8 @@ _LABELLED = 60  # curves: more labels cover each other, the longest and the circ
 _COLUMNS = ("name", "edge", "length", "length_std", "diameter", "diameter_std", "angle", "angle_std", "position_std")
 _STYLE = (
     "body{font:15px/1.5 system-ui,sans-serif;max-width:1000px;margin:2em auto;padding:0 1em}"
-    "svg{max-width:100%;height:auto;border:1px solid #ddd}table{border-collapse:collapse;font-size:13px}td,th{padding:.2em .7em;text-align:right;"
+    "svg{max-width:100%;height:auto;border:1px solid #ddd}"
+    "table{border-collapse:collapse;font-size:13px}td,th{padding:.2em .7em;text-align:right;"
     "border-bottom:1px solid #eee}td:first-child,th:first-child{text-align:left}"
 )
 

@@ -8,7 +8,6 @@ from edgel._kernels.eigen import smallest_eigenpair
 from edgel._kernels.frames import tangents
 from edgel._kernels.parallel import kernel
 
-LINE, CIRCLE = 0, 1
 SHAPE = 13
 """Numbers of a shape: its origin (a line's middle, a circle's centre), three axes, and the radius, 0 of a line. The
 third axis is the line's direction, or the circle's axis."""

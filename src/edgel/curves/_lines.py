@@ -172,10 +172,9 @@ def _write(shape, fit, faces, inward, bend, spread, number, covariance, middle, 
         fit[_fit.NORMALS + 2 * k], fit[_fit.NORMALS + 2 * k + 1] = a, b
         sign = 1.0 if -b * (into @ shape[3:6]) + a * (into @ shape[6:9]) >= 0.0 else -1.0
         fit[_fit.INWARD + 2 * k], fit[_fit.INWARD + 2 * k + 1] = -sign * b, sign * a
-    one = 0 if number[0] >= number[1] else 1
     det = faces[0, 0] * faces[1, 1] - faces[0, 1] * faces[1, 0] if fit[_fit.STATE] == _fit.MEASURED else 1.0
     place = (covariance[0, 0, 0] + covariance[1, 0, 0]) / (det * det)
     turn = (covariance[0, 1, 1] + covariance[1, 1, 1]) / (det * det)
     fit[_fit.POSITION_STD], fit[_fit.TURN_STD] = math.sqrt(max(place, 0.0)), math.sqrt(max(turn, 0.0)) / half
     fit[_fit.RADIUS_STD] = math.nan
-    fit[_fit.ANGLE_STD] = math.sqrt(max(covariance[0, 2, 2] + covariance[1, 2, 2], 0.0)) if one >= 0 else math.nan
+    fit[_fit.ANGLE_STD] = math.sqrt(max(covariance[0, 2, 2] + covariance[1, 2, 2], 0.0))
