@@ -39,6 +39,8 @@ def test_a_frustum_is_its_twelve_lines_and_eight_corners(block):
     assert curves.measured.all()
     turns = np.array([np.median(curve.dihedral) for curve in true.creases])
     np.testing.assert_allclose(np.sort(curves.angle), np.sort(turns), atol=0.02)
+    off = np.sort(curves.angle) - np.sort(turns)
+    assert 0.2 < np.sqrt(np.mean((off / curves.angle_std) ** 2)) < 3
 
 
 def test_rims_are_circles_measured_on_plane_and_wall(cylinder):
@@ -94,6 +96,16 @@ def test_far_from_the_origin(block):
     here = trace(scene.cloud, edges)
     there = trace(scene.cloud.xyz + far, replace(edges, position=edges.position + far))
     np.testing.assert_allclose(there.vertices - far, here.vertices, atol=1e-6)
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1e4])
+def test_the_unit_does_not_matter(block, unit):
+    scene, edges = block
+    one = trace(scene.cloud, edges)
+    other = trace(scene.cloud.xyz * unit, replace(edges, position=edges.position * unit))
+    np.testing.assert_allclose(other.vertices / unit, one.vertices, atol=1e-6)
+    np.testing.assert_allclose(other.length_std / unit, one.length_std, rtol=1e-6)
+    np.testing.assert_allclose(other.angle_std, one.angle_std, rtol=1e-6)
 
 
 def test_only_points_near_edges_are_looked_at(block):

@@ -101,6 +101,7 @@ def fit_line_faces(shape, beside, xyz, rows, position, normals, h, reach, low, h
         tilt[0], tilt[1] = faces[0, 0] * x1 + faces[0, 1] * y1, faces[1, 0] * x1 + faces[1, 1] * y1
     fit[_fit.STATE] = _fit.MEASURED if both else _fit.EDGE_ALONE
     _write(shape, fit, faces, inward, bend, spread, number, covariance, middle, half, x0, x1, y0, y1)
+    fit[_fit.ANGLE_STD] = math.sqrt(max(covariance[0, 2, 2] + covariance[1, 2, 2], 0.0)) / h
 
 
 @kernel
@@ -177,4 +178,3 @@ def _write(shape, fit, faces, inward, bend, spread, number, covariance, middle, 
     turn = (covariance[0, 1, 1] + covariance[1, 1, 1]) / (det * det)
     fit[_fit.POSITION_STD], fit[_fit.TURN_STD] = math.sqrt(max(place, 0.0)), math.sqrt(max(turn, 0.0)) / half
     fit[_fit.RADIUS_STD] = math.nan
-    fit[_fit.ANGLE_STD] = math.sqrt(max(covariance[0, 2, 2] + covariance[1, 2, 2], 0.0))
