@@ -1,6 +1,7 @@
 """The answer itself: its parts, what it writes into a cloud, and that every format keeps that."""
 
 import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from edgel.edges import as_kinds, kind_names
 
 NAN = np.nan
 LABELS = ["edge_kind", "edge_strength", "edge_angle", "edge_convex", "nx", "ny", "nz"]
-MORE = ["nx2", "ny2", "nz2", "tx", "ty", "tz", "edge_x", "edge_y", "edge_z", "edge_std"]
+MORE = ["nx2", "ny2", "nz2", "tx", "ty", "tz", "edge_x", "edge_y", "edge_z", "edge_std", "edge_scale"]
 
 
 def cloud_of_five():
@@ -181,3 +182,19 @@ def test_columns_of_the_input_make_room():
         assert not {"NX", " edge_kind"} & set(cloud.attributes)
     assert np.array_equal(whole.attributes["tx"], np.arange(300))  # label has no tangent
     assert np.array_equal(some.attributes["input_tx"], edges.index)
+
+
+def test_edges_of_a_scale_are_those_in_between_and_those_whose_scale_is_not_known():
+    edges = edges_of_three()
+    assert edges.of_scale(1.0).index.tolist() == edges.index[1:].tolist()
+    assert edges.of_scale(high=1.0).index.tolist() == edges.index[[0, 2]].tolist()
+    with pytest.raises(ValueError, match="low, high: expected two lengths"):
+        edges.of_scale(2.0, 1.0)
+
+
+def test_edges_are_joined_by_row_and_the_first_ones_count():
+    edges = edges_of_three()
+    other = replace(edges, strength=edges.strength / 2)
+    joined = edges.take(np.array([0, 2])).join(other)
+    assert joined.index.tolist() == edges.index.tolist()
+    assert joined.strength.tolist() == [edges.strength[0], other.strength[1], edges.strength[2]]

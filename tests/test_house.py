@@ -14,7 +14,7 @@ import edgel
 ROOT = Path(edgel.__file__).parent
 FLOORS = [
     {"cloud", "_objects", "_intrinsics", "_depth", "_columns", "_kernels", "_stages"},
-    {"edges", "_faces", "_neighbors", "io"},
+    {"edges", "_kinds", "_faces", "_neighbors", "io"},
     {"_scale", "_surface", "_range_image", "_color", "paper", "plot", "synth", "metrics"},
     {"_labels", "_sides", "_detect", "export"},
     {"tiled"},

@@ -5,6 +5,7 @@ import pytest
 from hall import hall, roof
 
 import edgel
+from edgel import synth
 from edgel._neighbors.spacing import median_spacing
 from edgel._neighbors.thinning import thin
 
@@ -48,3 +49,41 @@ def test_bad_scales_are_refused(scale):
         edgel.detect(roof(), scale=scale)
     with pytest.raises(ValueError, match="scale"):
         edgel.paper.detect(roof(), scale=scale)
+
+
+def bent(radius, seed=0):
+    """Two planes at a right angle, joined by a round of some radius along y; one point a unit square."""
+    rng = np.random.default_rng(seed)
+    arc, half, length = radius * np.pi / 2, 25.0, 50.0
+    along = rng.uniform(-half - arc / 2, half + arc / 2, round(14 * (2 * half + arc) * length))
+    angle = np.clip(along, -arc / 2, arc / 2) / radius
+    beyond = (np.abs(along) - arc / 2).clip(0) * np.sqrt(0.5)
+    xyz = np.column_stack(
+        [
+            radius * np.sin(angle) + np.sign(along) * beyond,
+            rng.uniform(0, length, len(along)),
+            radius * np.cos(angle) - beyond,
+        ]
+    )
+    return xyz[synth.poisson_disc(xyz, 0.752)]
+
+
+def test_softer_edges_are_found_at_larger_scales_and_say_so():
+    scales = []
+    for radius in (0.01, 3.0, 6.0):
+        cloud = bent(radius)
+        found = edgel.detect(cloud, kinds="crease", max_scale=8)
+        ridge = found.take((np.abs(cloud[found.index, 0]) < 4) & (np.abs(cloud[found.index, 1] - 25) < 20))
+        assert len(ridge) >= 5
+        scales.append(np.median(ridge.scale))
+        assert (np.abs(cloud[found.index, 0]) < 5).all()
+        assert found.parameters["max_scale"] == 8
+    assert scales[0] < 2.2 < scales[1] < scales[2]
+    # The choice is the user's: without fillets the soft one is none.
+    assert len(found.of_scale(high=2.0)) == 0
+
+
+@pytest.mark.parametrize("max_scale", [0.5, np.nan, np.inf])
+def test_a_largest_scale_below_the_least_is_refused(max_scale):
+    with pytest.raises(ValueError, match="max_scale: expected the scale"):
+        edgel.detect(hall(), max_scale=max_scale)

@@ -73,8 +73,9 @@ def test_lines_do_not_depend_on_the_order_of_the_points():
     by_point = []
     for rows in (np.arange(len(xyz)), shuffled):
         index = build_index(np.ascontiguousarray(xyz[rows]))
-        stretch = np.empty((len(xyz), 3))
-        stretch[rows[index.order]] = scan_line_stretch(index).T
+        found, stretch = scan_line_stretch(index), np.empty((len(xyz), 3))
+        assert found is not None
+        stretch[rows[index.order]] = found.T
         by_point.append(stretch)
     assert np.array_equal(*by_point)
 

@@ -1,8 +1,7 @@
 """Two curved faces that meet in an edge: where exactly, and how sure that is.
 
 Each face is a quadric over its own tangent plane. Its curvatures have a prior, since few neighbours under noise tell
-little of them: then it is nearly a plane, and the standard deviation of the position holds what that leaves open.
-Planes alone place the rim of a hole on the chord of its arc.
+little of them; what that leaves open is in the deviation. Planes alone place a hole's rim on the chord of its arc.
 """
 
 from __future__ import annotations
@@ -30,8 +29,7 @@ _FLOOR = 0.01  # spacings: residuals below say nothing
 _WEIGHT, _WEIGHT_SMALLER = 4.0, 1.0  # residuals that the noise of the first fit stands for in the others
 _BAND = 1.5  # standard deviations from the edge within which noise decides on which face a neighbour lies
 _LEAST = 4  # neighbours of a face
-_ROUNDS = 5
-_SETTLED = 0.05  # standard deviations of the residuals
+_ROUNDS, _SETTLED = 5, 0.05  # standard deviations of the residuals
 _SUMS = 22  # of powers: see `_POWER`
 _POWER = np.array(  # which sum each product of two terms, and of a term with the height, is
     [
