@@ -7,14 +7,15 @@ import numpy as np
 from edgel._kernels.parallel import kernel
 from edgel._neighbors.kdtree import NeighborIndex, build_index
 from edgel._neighbors.knn import knn, visit_neighbors
-from edgel._neighbors.queries import at_places
+from edgel._neighbors.queries import anywhere, at_places
 from edgel._neighbors.scan_lines import stretch_reach
 from edgel._surface.context import NEIGHBORS
 from edgel._surface.leaves import Leaves
 from edgel._surface.plane_scales import SCALES
 from edgel._surface.two_planes import FITS
 
-_USUAL = 1.5  # times the median reach of leaves, within which most lie
+_CHAIN = (NEIGHBORS + 1, FITS[-1][0], SCALES[-1])  # neighbours of a point, of each of these, and of each of theirs
+_USUAL = 2.0  # times the median of leaves, within which nearly all reach
 _BLOCK = 65_536  # places whose leaves' centroids exist at a time
 
 
@@ -31,14 +32,13 @@ def evidence_reach(
     """
     farthest = screening_reach(index, leaves)
     of_stretch = np.zeros(len(index)) if stretch is None else stretch_reach(index)
-    chain = (NEIGHBORS + 1, FITS[-1][0], SCALES[-1])
     asked = [places]
-    for count in chain[:-1]:
+    for count in _CHAIN[:-1]:
         near = np.zeros(len(index), np.bool_)
         k = min(count, len(index))
         visit_neighbors(_mark, at_places(index, asked[-1], stretch=stretch), index, k, near)
         asked.append(np.flatnonzero(near))
-    for count, some in zip(reversed(chain), reversed(asked), strict=True):
+    for count, some in zip(reversed(_CHAIN), reversed(asked), strict=True):
         visit = _or_radius if count == SCALES[-1] else _and_farthest
         result = np.zeros(len(index))
         queries = at_places(index, some, some, stretch)  # no point lies farther than it does stretched
@@ -47,34 +47,57 @@ def evidence_reach(
     return farthest[places]
 
 
-def settled(index: NeighborIndex, leaves: Leaves, depth: np.ndarray) -> np.ndarray:
-    """Say at which places (N,) bool nothing can change that lies farther away than some depth (N,).
+def settled(index: NeighborIndex, leaves: Leaves, depth: np.ndarray, asked: np.ndarray) -> np.ndarray:
+    """Say at which of some places, `asked` (N,) bool, nothing can change that lies farther away than a depth (N,).
 
-    Most are told by their leaves: where all leaves around reach no farther than usual, no chain of three does. The
-    others are looked at one by one (`evidence_reach`).
+    Most are told by a bound on how far all around reach; the others are looked at one by one (`evidence_reach`).
     """
-    octree = leaves.octree
-    begins, number = octree.starts[:-1], np.diff(octree.starts)
-    leaf = octree.leaf_of_places()
-    off = _off_centre(index, leaves, leaf)
-    extent = np.maximum.reduceat(off[octree.places], begins)
-    shallow = np.minimum.reduceat(depth[octree.places], begins)
-    nearest = leaves.nearest
-    enough = number[nearest].sum(axis=1) >= FITS[-1][0]
-    beyond = np.maximum(extent[nearest].max(axis=1), leaves.radii[nearest].max(axis=1))
-    reach = np.where(enough, extent + leaves.radii + beyond, np.inf)
-    usual = _USUAL * np.median(reach)
-    far = reach > usual
-    clear = ~far & (shallow > 3 * usual)
-    if far.any() and clear.any():
-        others = build_index(np.ascontiguousarray(leaves.centroids[far]))
-        away = knn(others, leaves.centroids[clear], 1).distances[:, 0]
-        clear[clear] = away > 2 * usual + extent[clear] + extent[far].max()
-    sure = clear[leaf]
-    places = np.flatnonzero(~sure)
+    sure = asked & (_bound(index, leaves) < depth)
+    places = np.flatnonzero(asked & ~sure)
     if len(places):
         sure[places] = evidence_reach(index, leaves, places) < depth[places]
     return sure
+
+
+def _bound(index: NeighborIndex, leaves: Leaves) -> np.ndarray:
+    """Bound `evidence_reach` at all places, (N,) float64, by the farthest that leaves around reach, seen from above."""
+    leaf, begins = leaves.octree.leaf_of_places(), leaves.octree.starts[:-1]
+    if len(index) < max(_CHAIN):
+        return np.full(len(index), np.inf)
+    radii = np.empty((len(_CHAIN), len(begins)))
+    visit_neighbors(_at_centres, anywhere(leaves.centroids), index, max(_CHAIN), np.array(_CHAIN), radii)
+    radii[-1] = np.maximum(radii[-1], leaves.radii + leaves.radii[leaves.nearest].max(axis=1))
+    # No point of a leaf reaches farther than its centroid does, and it lies from that.
+    radii += np.maximum.reduceat(_off_centre(index, leaves, leaf)[leaves.octree.places], begins)
+    usual = _USUAL * np.median(radii[:-1], axis=1)
+    plan = index.xyz[:2] - index.xyz[:2].min(axis=1, keepdims=True)
+    size = max(float(usual[0]) / 2, float(np.sqrt(np.prod(np.ptp(plan, axis=1)) / len(index))))
+    column, row = (plan // size).astype(np.int64)
+    farthest, beyond = radii[-1][leaf], float(radii[-1].max())
+    for own, most in zip(radii[-2::-1], usual[::-1], strict=True):
+        around = np.zeros((column.max() + 1, row.max() + 1))
+        np.maximum.at(around, (column, row), farthest)
+        around = _largest_around(around, int(np.ceil(most / size)))
+        farthest = own[leaf] + np.where(own[leaf] <= most, around[column, row], beyond)
+        beyond = float(farthest.max())
+    return farthest
+
+
+def _largest_around(values: np.ndarray, cells: int) -> np.ndarray:
+    """Return the largest of the values (R, C), not negative, within so many cells of each."""
+    for axis in (0, 1):
+        padded = np.moveaxis(values, axis, 0)
+        padded = np.pad(padded, ((cells, cells), (0, 0)))
+        rows = len(padded) - 2 * cells
+        values = np.moveaxis(np.max([padded[i : i + rows] for i in range(2 * cells + 1)], axis=0), 0, axis)
+    return values
+
+
+@kernel
+def _at_centres(first, places, squared, queries, targets, xyz, counts, radii):
+    for q in range(places.shape[0]):
+        for i in range(len(counts)):
+            radii[i, targets[first + q]] = np.sqrt(squared[q, counts[i] - 1])
 
 
 def screening_reach(index: NeighborIndex, leaves: Leaves) -> np.ndarray:

@@ -75,7 +75,7 @@ def _classify(plan: Plan, whole: Whole, tile: int) -> dict[str, np.ndarray]:
         screening = screen(index, statistics)
         found = classify(index, screening)
         own = window.core if wanted is None else np.isin(window.keys[index.order], wanted) & window.core
-        sure = np.ones(len(index), bool) if window.endless else settled(index, screening.leaves, window.depth)
+        sure = own if window.endless else settled(index, screening.leaves, window.depth, own)
         if wanted is None and whole.from_above:
             shown = _shown(window, pixel_size(statistics.spacing))
         mine = np.zeros(len(index), bool)
