@@ -139,7 +139,7 @@ def no_edges(count):
     nothing = np.empty(0)
     return Edges(
         index=np.empty(0, np.int64), kind=np.empty(0, np.uint8), strength=nothing, position=np.empty((0, 3)),
-        position_std=nothing, direction=np.empty((0, 3)), normals=np.empty((0, 2, 3)), angle=nothing,
+        position_std=nothing, scale=nothing, direction=np.empty((0, 3)), normals=np.empty((0, 2, 3)), angle=nothing,
         convex=np.empty(0, np.int8), orientation="unknown", num_points=count, num_dropped=0, method="surface",
         reason="", parameters={}, seconds={},
     )  # fmt: skip
