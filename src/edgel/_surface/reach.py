@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from edgel._kernels.parallel import kernel
-from edgel._neighbors.kdtree import NeighborIndex, build_index
-from edgel._neighbors.knn import knn, visit_neighbors
+from edgel._neighbors.kdtree import NeighborIndex
+from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.queries import anywhere, at_places
 from edgel._neighbors.scan_lines import stretch_reach
 from edgel._surface.context import NEIGHBORS
