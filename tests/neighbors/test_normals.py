@@ -4,7 +4,9 @@ import pytest
 from scipy.spatial import KDTree
 
 import edgel
-from edgel._neighbors.normals import by_offset
+from edgel._neighbors.kdtree import build_index
+from edgel._neighbors.normals import by_offset, fit_nearest, fit_planes
+from edgel._neighbors.queries import at_points
 
 
 def surface(n=2000, seed=0, noise=0.01):
@@ -130,3 +132,17 @@ def test_fewer_points_than_neighbours_are_all_used():
 def test_wrong_options_are_named(options, error, message):
     with pytest.raises(error, match=message):
         edgel.estimate_normals(surface(), **options)
+
+
+def test_planes_by_nearness_are_those_of_the_tree_and_the_same_in_a_part():
+    rng = np.random.default_rng(5)
+    xyz = np.column_stack([*rng.uniform(0, 40, (2, 3000)), 0.05 * rng.standard_normal(3000)]) + [5e5, 5e6, 100]
+    asked = np.flatnonzero(np.abs(xyz[:, 0] - 500_010) < 4)
+    whole, part = build_index(xyz), np.flatnonzero(xyz[:, 0] < 500_020)
+    planes, wanted = (fit(whole, at_points(whole, asked), 16) for fit in (fit_nearest, fit_planes))
+    for name, near in (("normals", 1e-9), ("offset", 1e-3), ("residual", 1e-9), ("variation", 1e-9)):
+        np.testing.assert_allclose(getattr(planes, name), getattr(wanted, name), atol=near)
+    index = build_index(np.ascontiguousarray(xyz[part]))
+    again = fit_nearest(index, at_points(index, np.searchsorted(part, asked)), 16)
+    for name in ("normals", "offset", "residual", "variation"):
+        assert getattr(again, name).tobytes() == getattr(planes, name).tobytes()

@@ -88,8 +88,12 @@ class Plan:
         found = make()
         path.parent.mkdir(parents=True, exist_ok=True)
         aside = path.with_name(f"{path.stem}.{os.getpid()}.part.npz")
-        np.savez(aside, **found)
-        os.replace(aside, path)
+        try:
+            np.savez(aside, **found)
+            os.replace(aside, path)
+        except BaseException:  # a full disk: what is half written only takes its place
+            aside.unlink(missing_ok=True)
+            raise
 
     def load(self, step: str, tile: int) -> Any:
         """Open the result of a step at a tile."""

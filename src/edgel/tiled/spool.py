@@ -68,10 +68,14 @@ def spool(path: str, number: int, folder: Path) -> Part:
         aside = place.with_name(f"{place.name}.{os.getpid()}.part")
         shutil.rmtree(aside, ignore_errors=True)
         aside.mkdir(parents=True)
-        part = _sort(cloud, path, number, aside)
-        (aside / "part.json").write_text(json.dumps(asdict(part)))
-        shutil.rmtree(place, ignore_errors=True)
-        aside.rename(place)
+        try:
+            part = _sort(cloud, path, number, aside)
+            (aside / "part.json").write_text(json.dumps(asdict(part)))
+            shutil.rmtree(place, ignore_errors=True)
+            aside.rename(place)
+        except BaseException:  # a full disk: what is half written only takes its place
+            shutil.rmtree(aside, ignore_errors=True)
+            raise
     return load_part(place)
 
 
