@@ -5,6 +5,7 @@ import pytest
 from training_examples import example
 
 from edgel._neighbors.kdtree import build_index
+from edgel._neighbors.scan_lines import scan_line_stretch
 from edgel._surface import classify, cloud_statistics, screen
 from edgel._surface.features import LEAF, NUM_EVIDENCE, NUM_SCREEN, POINT
 from edgel._surface.forest import evaluate, load_forests
@@ -39,7 +40,8 @@ def test_screening_features_are_in_the_layouts(made):
     assert found.features.shape == (asked.sum(), NUM_SCREEN)
     assert np.array_equal(np.sort(found.points), np.flatnonzero(asked))
     assert found.leaves.shape == (found.leaf.max() + 1, len(LEAF))
-    values = cloud_statistics(smoothed(build_index(made.xyz))).features
+    index = smoothed(build_index(made.xyz))
+    values = cloud_statistics(index, scan_line_stretch(index)).features
     for rows, layout in ((found.features, POINT), (found.leaves, LEAF)):
         np.testing.assert_array_equal(rows[:, layout.block("cloud")], np.broadcast_to(values, (len(rows), 8)))
     np.testing.assert_array_equal(np.bincount(found.leaf), found.leaves[:, LEAF.column("leaf.count")])
@@ -48,7 +50,8 @@ def test_screening_features_are_in_the_layouts(made):
 def test_the_screening_is_that_of_detection(made):
     forests = load_forests()
     index = smoothed(build_index(made.xyz))
-    wanted = screen(index, cloud_statistics(index)).probability
+    stretch = scan_line_stretch(index)
+    wanted = screen(index, cloud_statistics(index, stretch), stretch=stretch).probability
     np.testing.assert_array_equal(screen_cloud(made.xyz, forests).probability[index.order], wanted)
     # Where the leaves let a point through, the forest says of its features what the screening says.
     found = screening_features(made.xyz, np.ones(len(made.xyz), bool))
@@ -60,7 +63,8 @@ def test_the_screening_is_that_of_detection(made):
 def test_evidence_and_context_are_those_of_detection(made):
     forests = load_forests()
     index = smoothed(build_index(made.xyz))
-    screening = screen(index, cloud_statistics(index))
+    stretch = scan_line_stretch(index)
+    screening = screen(index, cloud_statistics(index, stretch), stretch=stretch)
     wanted = classify(index, screening)
     asked = np.zeros(len(made.xyz), bool)
     asked[wanted.points] = True
