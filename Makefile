@@ -10,7 +10,7 @@ demo: install
 	$(BIN)/edgel demo -o demo
 
 test: install lint
-	$(BIN)/pytest
+	$(BIN)/pytest -n 2 --dist loadfile
 
 # The kernels with every index checked, by two processes: none reads or writes outside its arrays.
 checked: install

@@ -21,6 +21,8 @@ from pathlib import Path
 from typing import Any
 
 import accuracy
+import curves
+import curves_real
 import geometry
 import growth
 import memory
@@ -69,6 +71,9 @@ def main() -> None:
     results["geometry"] = geometry.run()
     results["wedges"] = geometry.wedges()
     results["convexity"], results["rims"] = outside.convexity(), outside.rims()
+    results["curves"] = curves.run(options.data, quick=options.quick)
+    results["curves_real"] = {} if options.quick else curves_real.run(options.data, options.real)
+    print("\n".join(curves.summary(results["curves"])))
     if not options.no_speed:
         sizes = (10_000, 100_000) if options.quick else (10_000, 30_000, 100_000, 300_000, 647_984)
         slowest = 2.0 if options.quick else speed.SLOWEST

@@ -17,7 +17,7 @@ FLOORS = [
     {"edges", "_kinds", "_faces", "_neighbors", "io"},
     {"_scale", "_surface", "_range_image", "_color", "paper", "plot", "synth", "metrics"},
     {"_labels", "_sides", "_detect", "export"},
-    {"tiled"},
+    {"curves", "tiled"},
     {"_report"},
     {"_demo", "_viewer"},
     {"_cli"},
@@ -136,7 +136,7 @@ def takes_options(module: str, node: ast.FunctionDef) -> bool:
 
 
 def test_import_is_light():
-    heavy = ["matplotlib", "laspy", "typer", "rich", "PIL", "pye57", "viser"]
+    heavy = ["matplotlib", "laspy", "typer", "rich", "PIL", "pye57", "viser", "ezdxf", "pyogrio", "shapely"]
     code = f"import sys, edgel; print(*(m for m in {heavy} if m in sys.modules))"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert loaded == []

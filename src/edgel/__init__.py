@@ -4,7 +4,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from edgel import paper
+    from edgel import curves, paper
     from edgel._depth import from_depth
     from edgel._detect import detect
     from edgel._intrinsics import Intrinsics
@@ -24,6 +24,7 @@ __all__ = [
     "FormatWarning",
     "Intrinsics",
     "Normals",
+    "curves",
     "detect",
     "estimate_normals",
     "from_depth",
@@ -48,7 +49,7 @@ _HOMES = {
     "read": "edgel.io",
     "write": "edgel.io",
 }
-_ROOMS = ("cloud", "edges", "export", "io", "metrics", "paper", "plot", "synth")
+_ROOMS = ("cloud", "curves", "edges", "export", "io", "metrics", "paper", "plot", "synth")
 
 
 def __getattr__(name: str) -> Any:

@@ -18,7 +18,7 @@ import edgel
 from edgel import io
 from edgel._cli import app
 
-COMMANDS = ("detect", "view", "normals", "info", "convert", "render", "demo")
+COMMANDS = ("detect", "view", "normals", "info", "convert", "render", "lines", "demo")
 ROOT = Path(__file__).parents[2]
 FACE = "facet normal 0 0 0\nouter loop\nvertex {}\nvertex {}\nvertex {}\nendloop\nendfacet\n"
 CORNER = FACE.format("0 0 0", "1 0 0", "0 1 0") + FACE.format("0 0 0", "0 1 0", "0 0 1")
@@ -126,6 +126,7 @@ def test_all_that_json_says_is_documented(folder, monkeypatch):
     commands = {
         "detect": ["scan.ply"],
         "render": ["scan.ply", "-o", "j.png", "--size", "320x240"],
+        "lines": ["scan.ply", "-o", "j.csv"],
         "normals": ["scan.ply", "-o", "j.ply"],
         "info": ["scan.ply"],
         "convert": ["scan.ply", "j.ply"],

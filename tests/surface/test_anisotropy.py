@@ -48,11 +48,12 @@ def test_what_is_out_of_reach_changes_nothing_on_scan_lines():
     of_whole, of_part = scan_line_stretch(whole), scan_line_stretch(part)
     statistics, said = cloud_statistics(whole, of_whole), []
     for index, stretch in ((whole, of_whole), (part, of_part)):
-        found = classify(index, screen(index, statistics, FORESTS, stretch))
+        screening = screen(index, statistics, FORESTS, stretch)
+        found = classify(index, screening)
         said.append(np.zeros((len(index), 2)))
         said[-1][found.points] = np.column_stack([found.crease, found.outline])
     reach = np.empty(len(tile))
-    reach[part.order] = evidence_reach(part, of_part)
+    reach[part.order] = evidence_reach(part, screening.leaves, np.arange(len(part)), of_part)
     sure = reach < cut - tile[:, 0]
     assert sure.mean() > 0.1
     expected, told = said[0][xyz[:, 0] < cut], said[1]

@@ -204,6 +204,7 @@ def test_leaves_are_described_as_by_numpy():
     assert found.centroids == pytest.approx(middles, abs=1e-6)
     for leaf in range(len(features)):
         spans = len(points[leaf]) >= leaves.SPANNING
+        variation = math.inf
         if spans:
             normal, variation, _ = naive.covariance_plane(points[leaf])
             assert abs(planes[leaf, :3] @ normal) == pytest.approx(1, abs=1e-6)

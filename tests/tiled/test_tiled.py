@@ -13,7 +13,7 @@ import pytest
 
 import edgel
 from edgel import tiled
-from edgel.tiled import engine, run
+from edgel.tiled import classify, engine, run
 from edgel.tiled.plan import Plan
 
 FIELDS = ("kind", "strength", "position", "position_std", "scale", "direction", "normals", "angle", "convex")
@@ -89,7 +89,7 @@ def test_a_run_that_was_killed_goes_on(files, whole, tmp_path):
 
 
 def test_a_tile_that_fails_is_tried_alone_and_named(files, whole, tmp_path, monkeypatch):
-    real, calls = run.classify_tile, []
+    real, calls = classify.classify_tile, []
 
     def failing(plan, answer, tile):
         calls.append(tile)
@@ -157,7 +157,7 @@ def test_much_noise_is_refused(strip, tmp_path):
 
 def test_a_disk_that_is_too_small_is_told_before(files, tmp_path, monkeypatch):
     usage = namedtuple("usage", "total used free")
-    monkeypatch.setattr(run.shutil, "disk_usage", lambda path: usage(10, 9, 1))
+    monkeypatch.setattr("shutil.disk_usage", lambda path: usage(10, 9, 1))
     with pytest.raises(OSError, match="larger disk"):
         tiled.detect(files, tmp_path / "out")
 

@@ -16,7 +16,7 @@ from edgel._surface.leaves import Leaves, describe_leaves
 from edgel._surface.plane_scales import SCALES
 from edgel._surface.statistics import Statistics
 
-LEAF = 0.2  # leaves with an edge that are expected among those nearest to a leaf: least for screening its points
+LEAF = 0.05  # leaves with an edge that are expected among those nearest to a leaf: least for screening its points
 POINT = 0.04  # least probability of an edge at a point, by the cheap evidence, for gathering the costly one
 
 

@@ -78,13 +78,13 @@ def start(workers: int, scheduler: str | None, progress: Callable[[str], None]) 
         yield Engine(None, progress)
         return
     try:
-        import dask  # pyright: ignore[reportMissingImports]
-        from distributed import Client, LocalCluster  # pyright: ignore[reportMissingImports]
+        from dask import config
+        from distributed import Client, LocalCluster
     except ImportError as error:
         raise ModuleNotFoundError(
             "several workers need Dask distributed: pip install edgel[tiles], or use one worker", name="distributed"
         ) from error
-    dask.config.set({"distributed.scheduler.allowed-failures": _PATIENCE})
+    config.set({"distributed.scheduler.allowed-failures": _PATIENCE})
     if scheduler is not None:
         with Client(scheduler) as client:
             yield Engine(client, progress)
@@ -97,7 +97,7 @@ def start(workers: int, scheduler: str | None, progress: Callable[[str], None]) 
             threads_per_worker=1,
             processes=True,
             memory_limit=0,
-            dashboard_address=None,
+            dashboard_address=None,  # pyright: ignore[reportArgumentType] - its way to have none
             env={"EDGEL_NUM_THREADS": str(threads)},
         ) as cluster,
         Client(cluster) as client,

@@ -1,0 +1,208 @@
+"""Curves measured on the faces beside them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from edgel._kernels.parallel import kernel, run_slices
+from edgel._neighbors.kdtree import NeighborIndex
+from edgel.curves import _fit, _rims
+from edgel.curves._circle import RADIUS, fit_line
+from edgel.curves._gather import REACH, Beside, gather
+from edgel.curves._lines import fit_line_faces
+from edgel.curves._points import EdgePoints
+from edgel.curves._ranges import ranges_of
+from edgel.curves._rims import fit_rim_faces
+from edgel.edges import EdgeKind
+
+_SHORT, _SHORTEST = 2.4, 1.5  # spacings: of faces too small for REACH
+_ROUGH = 0.15  # spacings: a face is that rough without the cloud being noisy
+_ROUGHER = 1.35  # times the noise of the cloud: no plane, cylinder or cone is rougher
+_COVERED = 0.2  # of the points that a face of full depth would have
+_DEEP = 3.9  # spacings: full depth
+_TURN = 0.15  # sine of the angle between faces, at least
+_SMALLEST, _LARGEST = 1.5, 200.0  # spacings: of radii; a larger arc is told from a line by no cloud
+_LOOSE = 0.45  # spacings: edge points of a shape with one face scatter less
+_RIPPLE = 0.05  # spacings
+_SAGITTA = 1.5  # spacings: an arc that rises less may be a line
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Shapes moved to where their faces meet.
+
+    Attributes
+    ----------
+    shape : (K, 13) float64
+    fit : (K, 23) float64
+        See `_fit`.
+    covariance : (K, 10, 10) float64
+        Of circles, see `_rims`.
+    ranges : (K, 2) float64
+        From where to where along each its edge points lie.
+    holds : (K,) bool
+        Whether its faces confirm it.
+    beside : Beside
+        The points of the cloud that they were measured on.
+    """
+
+    shape: np.ndarray
+    fit: np.ndarray
+    covariance: np.ndarray
+    ranges: np.ndarray
+    holds: np.ndarray
+    beside: Beside
+
+
+def measure(
+    index: NeighborIndex,
+    xyz: np.ndarray,
+    shapes: np.ndarray,
+    rows: tuple[np.ndarray, np.ndarray],
+    points: EdgePoints,
+    position: np.ndarray,
+    spacing: np.ndarray,
+) -> Measured:
+    """Fit the faces beside shapes (K, 13), and tell which fits hold.
+
+    Takes the edge points of each shape (as rows, and where each shape's begin), all edge points and their smoothed
+    places (E, 3), and the spacing (K,) of the cloud at the shapes. A shape whose faces are too rough is tried on less
+    of them, since small parts have small faces, and an arc that is no arc as a line.
+    """
+    ranges = ranges_of(shapes, rows, position)
+    beside = gather(index, xyz, shapes, ranges, spacing)
+    outline = _outlines(points, rows)
+    best = _attempt(shapes, np.arange(len(shapes)), REACH, beside, xyz, rows, points, position, spacing, ranges)
+    noise = _noise_of(best, spacing)
+    good = _holds(best, noise, spacing, outline)
+    lines = np.zeros_like(shapes)
+    run_slices(_as_lines, len(shapes), lines, *rows, position, size=64)
+    for reach, straight in ((_SHORT, False), (REACH, True), (_SHORT, True), (_SHORTEST, False), (_SHORTEST, True)):
+        curved = shapes[:, RADIUS] > 0
+        which = np.flatnonzero((~good | _nearly_straight(best, spacing)) & (curved | (not straight)))
+        if not len(which):
+            continue
+        begin = lines if straight else shapes
+        along = ranges_of(begin, rows, position) if straight else ranges
+        other = _attempt(begin, which, reach, beside, xyz, rows, points, position, spacing, along)
+        holds = _holds(other, noise, spacing[which], outline[which])
+        better = holds & (
+            ~good[which] | (straight & (_rough(other) < 1.15 * _rough(best)[which] + 0.02 * spacing[which]))
+        )
+        for name in ("shape", "fit", "covariance", "ranges"):
+            getattr(best, name)[which[better]] = getattr(other, name)[better]
+        good[which[better]] = True
+    return Measured(best.shape, best.fit, best.covariance, ranges_of(best.shape, rows, position), good, beside)
+
+
+@dataclass(frozen=True, eq=False)
+class _Attempt:
+    shape: np.ndarray
+    fit: np.ndarray
+    covariance: np.ndarray
+    ranges: np.ndarray
+
+
+def _attempt(
+    shapes: np.ndarray,
+    which: np.ndarray,
+    reach: float,
+    beside: Beside,
+    xyz: np.ndarray,
+    rows: tuple[np.ndarray, np.ndarray],
+    points: EdgePoints,
+    position: np.ndarray,
+    spacing: np.ndarray,
+    ranges: np.ndarray,
+) -> _Attempt:
+    """Fit the faces beside some shapes, as far from the edge as a reach, in spacings."""
+    shape, fit = shapes[which], np.full((len(which), _fit.FIT), np.nan)
+    fit[:, _fit.STATE] = _fit.NONE
+    covariance = np.zeros((len(which), _rims.UNKNOWNS, _rims.UNKNOWNS))
+    arguments = (which, reach, shape, beside.points, beside.start, xyz, *rows, points.position, points.normals)
+    run_slices(_fit_faces, len(which), *arguments, spacing, ranges, fit, covariance, size=8)
+    return _Attempt(shape, fit, covariance, ranges[which].copy())
+
+
+def _rough(fitted: _Attempt) -> np.ndarray:
+    return np.nan_to_num(fitted.fit[:, _fit.SIGMA : _fit.SIGMA + 2], nan=np.inf).max(axis=1)
+
+
+def _noise_of(fitted: _Attempt, spacing: np.ndarray) -> float:
+    """Return how far points lie from faces, in spacings, in the middle of all fits."""
+    both = fitted.fit[:, _fit.STATE] == _fit.MEASURED
+    return float(np.median(fitted.fit[both, _fit.SIGMA : _fit.SIGMA + 2] / spacing[both, None])) if both.any() else 0.0
+
+
+def _nearly_straight(fitted: _Attempt, spacing: np.ndarray) -> np.ndarray:
+    """Tell which arcs (K,) are so short that lines may be meant."""
+    radius = fitted.shape[:, RADIUS]
+    length = fitted.ranges[:, 1] - fitted.ranges[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return (radius > 0) & (length < 1.6 * radius) & (length**2 / (8 * radius) < _SAGITTA * spacing)
+
+
+def _holds(fitted: _Attempt, noise: float, spacing: np.ndarray, outline: np.ndarray) -> np.ndarray:
+    """Tell which shapes (K,) their faces confirm: smooth ones, along all of it, as lines and circles have."""
+    fit, radius = fitted.fit, fitted.shape[:, RADIUS]
+    counts, sigma = fit[:, _fit.COUNTS : _fit.COUNTS + 2], fit[:, _fit.SIGMA : _fit.SIGMA + 2] / spacing[:, None]
+    a, b, c, d = fit[:, _fit.NORMALS : _fit.NORMALS + 4].T
+    length = np.maximum((fitted.ranges[:, 1] - fitted.ranges[:, 0]) / spacing, 2.0)
+    with np.errstate(invalid="ignore"):
+        smooth = (sigma < np.maximum(_ROUGH, _ROUGHER * noise)).all(axis=1)
+        measured = smooth & (counts.min(axis=1) > _COVERED * _DEEP * length) & (np.abs(a * d - b * c) > _TURN)
+        alone = outline & (np.nan_to_num(sigma).max(axis=1) < max(_LOOSE, 1.5 * noise))
+        # A wall that goes in and out as it goes round is several flat ones.
+        measured &= ~(fit[:, _fit.RIPPLE] > _RIPPLE * spacing)
+    state = fit[:, _fit.STATE]
+    plausible = (radius == 0) | ((radius > _SMALLEST * spacing) & (radius < _LARGEST * spacing))
+    return plausible & ((state == _fit.MEASURED) & measured | (state == _fit.EDGE_ALONE) & alone)
+
+
+def _outlines(points: EdgePoints, rows: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """Tell which shapes (K,) have more edge points where a surface ends than where two meet."""
+    return mean_of((points.kind & np.uint8(EdgeKind.CREASE) == 0).astype(np.float64), rows) > 0.5
+
+
+def mean_of(values: np.ndarray, rows: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """Return the means (K,) of values over rows, given as rows and where each mean's begin."""
+    if not len(rows[0]):
+        return np.empty(len(rows[1]) - 1)
+    return np.add.reduceat(values[rows[0]], rows[1][:-1]) / np.diff(rows[1])
+
+
+@kernel
+def _as_lines(start, stop, lines, rows, first, position):
+    for k in range(start, stop):
+        fit_line(position, rows[first[k] : first[k + 1]], lines[k])
+
+
+@kernel
+def _fit_faces(
+    start,
+    stop,
+    which,
+    reach,
+    shape,
+    beside,
+    begin,
+    xyz,
+    rows,
+    first,
+    position,
+    normals,
+    spacing,
+    ranges,
+    fit,
+    covariance,
+):
+    for q in range(start, stop):
+        k = which[q]
+        near, own = beside[begin[k] : begin[k + 1]], rows[first[k] : first[k + 1]]
+        h, low, high = spacing[k], ranges[k, 0], ranges[k, 1]
+        if shape[q, RADIUS] == 0.0:
+            fit_line_faces(shape[q], near, xyz, own, position, normals, h, reach, low, high, fit[q])
+        else:
+            fit_rim_faces(shape[q], near, xyz, own, position, normals, h, reach, low, high, fit[q], covariance[q])

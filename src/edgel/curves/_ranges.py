@@ -1,0 +1,36 @@
+"""From where to where along shapes their edge points lie."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from edgel._kernels.parallel import kernel, run_slices
+from edgel.curves._circle import RADIUS, along_of
+
+
+def ranges_of(shapes: np.ndarray, owned: tuple[np.ndarray, np.ndarray], position: np.ndarray) -> np.ndarray:
+    """Return from where to where (K, 2) along shapes (K, 13) their edge points lie; past pi r where an arc does."""
+    ranges = np.zeros((len(shapes), 2))
+    run_slices(_ranges, len(shapes), shapes, *owned, position, ranges, size=64)
+    return ranges
+
+
+@kernel
+def _ranges(start, stop, shapes, rows, first, position, ranges):
+    for k in range(start, stop):
+        own = rows[first[k] : first[k + 1]]
+        if len(own) == 0:
+            continue
+        along = np.empty(len(own))
+        for q in range(len(own)):
+            along[q] = along_of(shapes[k], position[own[q], 0], position[own[q], 1], position[own[q], 2])
+        along.sort()
+        low, high = along[0], along[-1]
+        around = 2.0 * np.pi * shapes[k, RADIUS]
+        if around > 0.0:  # an arc begins behind the largest gap
+            gap = low + around - high
+            for q in range(len(along) - 1):
+                if along[q + 1] - along[q] > gap:
+                    gap = along[q + 1] - along[q]
+                    low, high = along[q + 1], along[q] + around
+        ranges[k, 0], ranges[k, 1] = low, high

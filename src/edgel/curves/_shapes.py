@@ -1,0 +1,124 @@
+"""From edge points to measured shapes: linked, split, measured on their faces, claimed, and measured again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from edgel.curves import _fit
+from edgel.curves._chains import Chains, link
+from edgel.curves._claim import claim
+from edgel.curves._measure import Measured, mean_of, measure
+from edgel.curves._points import EdgePoints
+from edgel.curves._smooth import Smoothed, smooth
+from edgel.curves._split import Pieces, split
+
+
+@dataclass(frozen=True, eq=False)
+class Shapes:
+    """Lines and circles, and the edge points of each; and runs of edge points that are neither.
+
+    Attributes
+    ----------
+    measured : Measured
+    spacing : (K,) float64
+    rows : (R,) int64, (K + 1,) int64
+        Edge points of each shape, and where each begins.
+    runs : list of (P,) int64
+        Edge points in order.
+    run_closed : list of bool
+    smoothed : Smoothed
+    """
+
+    measured: Measured
+    spacing: np.ndarray
+    rows: tuple[np.ndarray, np.ndarray]
+    runs: list[np.ndarray]
+    run_closed: list[bool]
+    smoothed: Smoothed
+
+
+def find_shapes(xyz: np.ndarray, points: EdgePoints) -> Shapes:
+    """Find the lines and circles of edge points, measured on the points (N, 3) of the faces beside them."""
+    smoothed = smooth(points.position, points.direction, points.spacing)
+    chains = link(smoothed, points.spacing, points.kind)
+    pieces = split(chains, smoothed.position, points.spacing, smoothed.spread)
+    paths = _paths(chains, pieces)
+    spacing = mean_of(points.spacing, paths)
+    first = measure(points.index, xyz, pieces.shape, paths, points, smoothed.position, spacing)
+    owner = np.full(len(points), -1)
+    claim(first.shape, _surest_first(first, paths), paths, smoothed, points.spacing, owner)
+    alive = np.flatnonzero(np.bincount(owner[owner >= 0], minlength=len(pieces)) >= 3)
+    owned = _rows_of(owner, alive, len(pieces))
+    # Again, on all that each has now, and from a place that is right.
+    spacing = mean_of(points.spacing, owned)
+    second = measure(points.index, xyz, first.shape[alive], owned, points, smoothed.position, spacing)
+    kept = np.flatnonzero(second.holds)
+    runs, closed = _left(chains, pieces, paths, np.isin(owner, alive[kept]), points)
+    return Shapes(_take(second, kept), spacing[kept], take_rows(owned, kept), runs, closed, smoothed)
+
+
+def _surest_first(measured: Measured, rows: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """Return the shapes that are good, those with most edge points and both faces first."""
+    number = np.diff(rows[1])
+    both = measured.fit[:, _fit.STATE] == _fit.MEASURED
+    order = np.lexsort((*measured.shape[:, :3].T, -number, ~both))
+    return order[measured.holds[order]]
+
+
+def _paths(chains: Chains, pieces: Pieces) -> tuple[np.ndarray, np.ndarray]:
+    """Return the edge points of all pieces, and where each begins."""
+    number = pieces.stop - pieces.start
+    begin = np.concatenate([[0], np.cumsum(number)])
+    piece = np.repeat(np.arange(len(pieces)), number)
+    first = chains.start[pieces.chain][piece]
+    length = np.diff(chains.start)[pieces.chain][piece]
+    at = pieces.start[piece] + np.arange(begin[-1]) - begin[piece]
+    return chains.points[first + (at - first) % length], begin
+
+
+def _rows_of(owner: np.ndarray, alive: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the edge points of those shapes that are alive, and where each begins."""
+    order = np.argsort(owner, kind="stable")
+    order = order[owner[order] >= 0]
+    start = np.concatenate([[0], np.cumsum(np.bincount(owner[order], minlength=count))])
+    return take_rows((order, start), alive)
+
+
+def take_rows(rows: tuple[np.ndarray, np.ndarray], kept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rows of some of several things, given as rows and where each thing's begin, in the same way."""
+    values, start = rows
+    number = np.diff(start)[kept]
+    begin = np.concatenate([[0], np.cumsum(number)])
+    at = np.repeat(start[kept] - begin[:-1], number) + np.arange(begin[-1])
+    return values[at], begin
+
+
+def _take(measured: Measured, kept: np.ndarray) -> Measured:
+    points, start = take_rows((measured.beside.points, measured.beside.start), kept)
+    beside = type(measured.beside)(points, start)
+    names = ("shape", "fit", "covariance", "ranges", "holds")
+    return replace(measured, beside=beside, **{name: getattr(measured, name)[kept] for name in names})
+
+
+def _left(
+    chains: Chains, pieces: Pieces, paths: tuple[np.ndarray, np.ndarray], taken: np.ndarray, points: EdgePoints
+) -> tuple[list[np.ndarray], list[bool]]:
+    """Return the runs of edge points along chains that no shape has taken, gaps of three and fewer bridged."""
+    runs, closed = [], []
+    for chain in range(len(chains)):
+        rows = chains.points[chains.start[chain] : chains.start[chain + 1]]
+        free = ~taken[rows]
+        if not free.any():
+            continue
+        if free.all():
+            runs.append(rows)
+            closed.append(bool(chains.closed[chain]))
+            continue
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], free, [False]]).astype(np.int8)))
+        for begin, stop in edges.reshape(-1, 2):
+            if stop - begin >= 3:
+                runs.append(rows[begin:stop])
+                closed.append(False)
+    return runs, closed
