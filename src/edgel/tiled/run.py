@@ -28,7 +28,7 @@ _EXPANDS = 8  # bytes of points in the spool for one of a compressed file, at mo
 
 
 class TileError(OSError):
-    """Some tiles failed twice: the message names them and why, and the same call goes on with them."""
+    """Some files or tiles failed twice: the message names them and why, and the same call goes on with them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,10 +190,13 @@ def _prepare(engine: Engine, paths: Sequence[str], work: Path, options: Options)
     jobs = [(path, number, work / "spool") for number, path in enumerate(paths)]
     failed = engine.run("reading", spool, jobs)
     if failed:
-        error = next(iter(failed.values()))
-        more = f"; {', '.join(paths[n] for n in [*failed][1:])} failed too" if len(failed) > 1 else ""
+        (number, error), *others = failed.items()
+        more = f"; {', '.join(paths[n] for n, _ in others)} failed too" if others else ""
+        what = str(error) if paths[number] in str(error) else f"{paths[number]}: {error}"
+        if isinstance(error, OSError):
+            raise TileError(f"{what}{more}; mend that, or free space on the disk of {work}, and go on") from error
         raise ValueError(
-            f"{error}{more}; every file is needed for the answer: mend it, or leave it out; all others are read"
+            f"{what}{more}; every file is needed for the answer: mend it, or leave it out; all others are read"
         ) from error
     parts = [spool(path, number, work / "spool") for number, path in enumerate(paths)]
     _check_parts(parts, options)
