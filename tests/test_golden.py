@@ -7,7 +7,7 @@ import pytest
 from edgel._neighbors.spacing import median_spacing
 
 STORED = golden.stored()
-STRAY = 0.005  # share of the edge points, and one more, that rounding may decide
+STRAY = 0.01  # of the edge points: on scan lines .9 % of the faint ones turn with the last bits of other machine code
 
 
 @pytest.mark.parametrize("name", STORED)
