@@ -7,7 +7,8 @@ import pytest
 from edgel._neighbors.spacing import median_spacing
 
 STORED = golden.stored()
-STRAY = 0.01  # of the edge points: on scan lines .9 % of the faint ones turn with the last bits of other machine code
+STRAY = 0.005  # share of the edge points, and one more, that rounding may decide
+STRAY_ON_LINES = 0.01  # on scan lines: with other machine code .9 % of the faint ones turned
 
 
 @pytest.mark.parametrize("name", STORED)
@@ -18,7 +19,7 @@ def test_answers_are_those_of_the_golden_file(name):
     spacing = median_spacing(cloud)
     for question in ("detect", "faint", "scale", "paper"):
         mine, wanted = ({f: part[f"{question}.{f}"] for f in golden.FIELDS} for part in (found, expected))
-        stray = 1 + STRAY * len(wanted["index"])
+        stray = 1 + (STRAY_ON_LINES if name == "block_lines" else STRAY) * len(wanted["index"])
         assert len(np.setxor1d(mine["index"], wanted["index"])) <= stray, question
         _, a, b = np.intersect1d(mine["index"], wanted["index"], return_indices=True)
         np.testing.assert_array_equal(mine["kind"][a], wanted["kind"][b], err_msg=question)

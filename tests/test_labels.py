@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from edgel import EdgeKind
-from edgel._labels import COLOR, LIKELY, Labels, strength_of_contrast
+from edgel._kinds import LIKELY
+from edgel._labels import COLOR, Labels, strength_of_contrast
 
 CREASE, BOUNDARY, COLORED = EdgeKind.CREASE, EdgeKind.BOUNDARY, EdgeKind.COLOR
 

@@ -8,7 +8,8 @@ from typing import Any, Literal
 import numpy as np
 
 from edgel._color import color_channels, color_edges
-from edgel._labels import LIKELY, label_edges, strength_of_contrast
+from edgel._kinds import LIKELY
+from edgel._labels import label_edges, strength_of_contrast
 from edgel._neighbors.normals import check_num_neighbors
 from edgel._neighbors.orientation import check_orient, who_knows
 from edgel._range_image import METHODS, choose_view, see_edges, without_no_return

@@ -7,6 +7,9 @@ from enum import IntFlag
 
 import numpy as np
 
+LIKELY = 0.5
+"""Strength of an edge that is as likely as not, whatever found it."""
+
 
 class EdgeKind(IntFlag):
     """Why a point is an edge point; a point can be several at once."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from edgel._kinds import LIKELY
 from edgel._range_image import SeenEdges, explaining_view, pixel_size, sides
 from edgel._surface import Strengths, Surface
 from edgel.edges import EdgeKind
 
-LIKELY = 0.5  # strength of an edge that is as likely as not
 BOLD = np.radians(30.0)  # least turn of the creases that windows in the image add to those of neighbourhoods
 COLOR = 0.2  # contrast of a color edge that is as likely as not
 

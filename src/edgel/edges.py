@@ -9,6 +9,7 @@ from typing import Any, Self
 import numpy as np
 
 from edgel._columns import make_room
+from edgel._faces import Faces
 from edgel._kinds import ASKABLE as ASKABLE
 from edgel._kinds import NAMES
 from edgel._kinds import OUTLINES as OUTLINES
@@ -25,18 +26,7 @@ _STD_COLUMN, _SCALE_COLUMN = "edge_std", "edge_scale"
 ALL_COLUMNS = (*FIRST_COLUMNS, *_FACE_COLUMNS, *_TANGENT_COLUMNS, *_PLACE_COLUMNS, _STD_COLUMN, _SCALE_COLUMN)
 """What `Edges.to_cloud` adds."""
 
-_PER_POINT = (
-    "index",
-    "kind",
-    "strength",
-    "position",
-    "position_std",
-    "scale",
-    "direction",
-    "normals",
-    "angle",
-    "convex",
-)
+_PER_POINT = ("index", "kind", "strength", *Faces.__dataclass_fields__)
 
 
 @dataclass(frozen=True, eq=False)

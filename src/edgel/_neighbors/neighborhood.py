@@ -46,24 +46,10 @@ def unstretch(own, vector, at):
 
 
 @kernel
-def stretch_normal(own, normal, at):
-    """Take a normal of a plane to that of the plane there, a unit again where it was one."""
-    unstretch(own, normal, at)
-    _normalize(normal, at)
-
-
-@kernel
-def unstretch_normal(own, normal, at):
-    """Take a normal back; returns how long it was before it was made a unit again."""
-    stretch(own, normal, at)
-    return _normalize(normal, at)
-
-
-@kernel
 def stretch_direction(own, direction, at):
-    """Take the direction of a line to that of the line there."""
+    """Take the direction of a line to that of the line there; returns how long it was before it was made a unit."""
     stretch(own, direction, at)
-    _normalize(direction, at)
+    return _normalize(direction, at)
 
 
 @kernel
@@ -71,6 +57,18 @@ def unstretch_direction(own, direction, at):
     """Take the direction of a line back."""
     unstretch(own, direction, at)
     _normalize(direction, at)
+
+
+@kernel
+def stretch_normal(own, normal, at):
+    """Take a normal of a plane to that of the plane there, a unit: it goes the way back."""
+    unstretch_direction(own, normal, at)
+
+
+@kernel
+def unstretch_normal(own, normal, at):
+    """Take a normal back; returns how long it was before it was made a unit again."""
+    return stretch_direction(own, normal, at)
 
 
 @kernel

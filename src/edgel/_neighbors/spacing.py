@@ -18,6 +18,7 @@ from edgel._neighbors.knn import knn
 from edgel._neighbors.queries import at_places
 from edgel.cloud import check_points
 
+DISC = 16  # nearest neighbours, the point among them, whose disc tells the area that a point stands for
 _SAMPLE = 20_000  # points whose nearest neighbours are looked for
 _CELLS = 2**24  # along an axis, at most, unless there are more points
 _PER_CELL = 8  # points in a cell, so that covered area is counted well
@@ -26,7 +27,7 @@ _PER_CELL = 8  # points in a cell, so that covered area is counted well
 @kernel
 def disc_spacing(squared):
     """Root of the area a point stands for, from the disc that its 16 nearest fill; takes their squared distances."""
-    k = min(len(squared), 16)
+    k = min(len(squared), DISC)
     return math.sqrt(math.pi * squared[k - 1] / k)
 
 

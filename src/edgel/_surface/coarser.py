@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from edgel._faces import Faces
+from edgel._kinds import LIKELY
 from edgel._neighbors.kdtree import NeighborIndex, build_index
 from edgel._neighbors.knn import knn
 from edgel._neighbors.queries import anywhere
@@ -15,7 +16,6 @@ from edgel._surface.line import Strengths
 
 CELL = 1.6  # spacings of the cloud: side of a cell
 FEWEST = 100  # cells that make a surface
-LIKELY = 0.5  # strength of what keeps the coarser look away
 FAINT = 0.25  # least strength, in the coarser look, of what is carried back
 APART = 1.5  # cells: what is seen nearer to a likely edge of the closer look is that edge again
 _PIECES = np.linspace(-0.5, 0.5, 5)  # of a cell, along the edge from each point that lies on one

@@ -9,12 +9,11 @@ from edgel._neighbors.kdtree import NeighborIndex
 from edgel._neighbors.knn import knn, visit_neighbors
 from edgel._neighbors.normals import Normals
 from edgel._neighbors.queries import at_points
+from edgel._neighbors.spacing import DISC
 from edgel._surface import rims
 from edgel._surface.classify import Classification
 from edgel._surface.curved_faces import COUNTS, EDGE, FIRST, LINE, POSITION, SECOND, STD, fit_curved_faces
 from edgel._surface.evidence import MAX_AWAY, MIN_TURN, support
-
-DISC = 16  # neighbours whose disc tells the density
 
 ALIKE = 2.75  # deviations of edges between faces of smoothed points over what independent errors would leave: measured
 

@@ -86,7 +86,7 @@ class Surface:
         with self._stages("classification"):
             return Strengths(found.points, *(strengths(index, found.points, p) for p in (found.crease, found.outline)))
 
-    @property
+    @cached_property
     def strengths(self) -> Strengths:
         """How marked the edges are there."""
         found = self._own_strengths

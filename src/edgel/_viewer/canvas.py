@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from edgel._labels import LIKELY
+from edgel._kinds import LIKELY
 from edgel._neighbors.thinning import thin
 from edgel._viewer.colors import cloud_colors, edge_colors
 from edgel._viewer.layout import FIELD_OF_VIEW, Layout, Placement, lay_out

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from edgel._color.channels import color_channels, intensity_of, rgb_of
-from edgel._labels import LIKELY
+from edgel._kinds import LIKELY
 from edgel._viewer.settings import Coloring
 from edgel._viewer.source import Source
 from edgel.edges import EdgeKind, Edges

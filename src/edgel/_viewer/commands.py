@@ -8,7 +8,7 @@ import shlex
 from pathlib import Path
 
 from edgel._detect import DEFAULT_KINDS
-from edgel._labels import LIKELY
+from edgel._kinds import LIKELY
 from edgel._viewer.session import Pane
 from edgel._viewer.settings import Settings
 from edgel.edges import kind_names

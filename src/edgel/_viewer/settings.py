@@ -8,7 +8,7 @@ from enum import Enum
 import numpy as np
 
 from edgel._detect import DEFAULT_KINDS
-from edgel._labels import LIKELY
+from edgel._kinds import LIKELY
 from edgel._viewer.runs import Method, Run
 from edgel.edges import EdgeKind
 

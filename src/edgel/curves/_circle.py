@@ -16,8 +16,8 @@ _ROUNDS = 4
 
 
 @kernel
-def fit_line(points, rows, shape):
-    """Write the line through some rows of points, and return the mean of the squared distances."""
+def _moments(points, rows):
+    """Return the mean of some rows of points, and the sums of squares and products about it."""
     count = len(rows)
     x = y = z = 0.0
     for i in rows:
@@ -27,6 +27,14 @@ def fit_line(points, rows, shape):
     for i in rows:
         a, b, c = points[i, 0] - x, points[i, 1] - y, points[i, 2] - z
         xx, xy, xz, yy, yz, zz = xx + a * a, xy + a * b, xz + a * c, yy + b * b, yz + b * c, zz + c * c
+    return x, y, z, xx, xy, xz, yy, yz, zz
+
+
+@kernel
+def fit_line(points, rows, shape):
+    """Write the line through some rows of points, and return the mean of the squared distances."""
+    count = len(rows)
+    x, y, z, xx, xy, xz, yy, yz, zz = _moments(points, rows)
     total = xx + yy + zz
     smallest, middle, nx, ny, nz = smallest_eigenpair(xx, xy, xz, yy, yz, zz)
     # The largest eigenvector: in the plane across the smallest one, by the angle of the moments there.
@@ -57,14 +65,7 @@ def set_frame(shape, x, y, z, dx, dy, dz):
 def fit_circle(points, rows, shape):
     """Write the circle through some rows of points, and return the mean of the squared distances; inf if none fits."""
     count = len(rows)
-    x = y = z = 0.0
-    for i in rows:
-        x, y, z = x + points[i, 0], y + points[i, 1], z + points[i, 2]
-    x, y, z = x / count, y / count, z / count
-    xx = xy = xz = yy = yz = zz = 0.0
-    for i in rows:
-        a, b, c = points[i, 0] - x, points[i, 1] - y, points[i, 2] - z
-        xx, xy, xz, yy, yz, zz = xx + a * a, xy + a * b, xz + a * c, yy + b * b, yz + b * c, zz + c * c
+    x, y, z, xx, xy, xz, yy, yz, zz = _moments(points, rows)
     _, _, nx, ny, nz = smallest_eigenpair(xx, xy, xz, yy, yz, zz)
     set_frame(shape, x, y, z, nx, ny, nz)
     # Kasa's circle in that plane: u^2 + v^2 = 2 a u + 2 b v + c; sums of u and v are 0.

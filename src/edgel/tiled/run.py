@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from edgel._detect import DEFAULT_KINDS
-from edgel._labels import LIKELY
+from edgel._kinds import LIKELY
 from edgel.cloud import as_vector
 from edgel.edges import EdgeKind, Edges, as_kinds
 from edgel.tiled.chains import draw_line, link_tile, merge_chains
