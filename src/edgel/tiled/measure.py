@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel._neighbors.kdtree import build_index
+from edgel._neighbors.kdtree import build_index, chosen
 from edgel._neighbors.knn import knn
 from edgel._neighbors.queries import at_places
 from edgel._neighbors.scan_lines import AREA, are_lines, on_lines
@@ -18,7 +18,8 @@ from edgel._surface.smoothing import noise_at, noise_of, share_of
 from edgel._surface.statistics import SAMPLE, Statistics, describe_places, statistics_of
 from edgel.tiled.plan import Plan
 
-_HALO = 12.0  # spacings, at first
+_SIDE = 8.0  # spacings, at first, of the cells around a sampled point that are looked at
+_NUMBERS = (SAMPLE, NOISE_SAMPLE, LINES_SAMPLE, FEW)
 
 
 def measure(plan: Plan, tile: int) -> None:
@@ -27,24 +28,24 @@ def measure(plan: Plan, tile: int) -> None:
 
 
 def _measure(plan: Plan, tile: int) -> dict[str, np.ndarray]:
-    halo, core, total = _HALO * plan.apart, plan.tiles[tile], plan.num_points
+    side, core, total = _SIDE * plan.apart, plan.tiles[tile], plan.num_points
     while True:
-        window = plan.window(tile, halo, plan.apart)
+        window = plan.window(tile, side, plan.apart)
         xyz, _ = plan.spool.load(window)
-        empty = {name: np.zeros(0) for name in ("spacing", "noise", "lines")}
-        empty |= {"features": np.zeros((0, NUM_FEATURES)), "few": np.zeros((0, 3))}
-        if not core.holds(xyz).any():
-            return {**empty, "read": np.array(len(xyz))}
-        index = build_index(xyz)
+        picked = core.holds(xyz) & chosen(np.ascontiguousarray(xyz.T), max(_NUMBERS), total)
+        near = _cells_around(xyz, picked, side)
+        if not picked.any():
+            empty = {name: np.zeros(0) for name in ("spacing", "noise", "lines")}
+            return {**empty, "features": np.zeros((0, NUM_FEATURES)), "few": np.zeros((0, 3))}
+        index = build_index(xyz[near])
         own = core.holds(index.xyz.T)
-        places = (index.sampled(number, total) for number in (SAMPLE, NOISE_SAMPLE, LINES_SAMPLE, FEW))
+        places = (index.sampled(number, total) for number in _NUMBERS)
         described, noisy, lined, few = (some[own[some]] for some in places)
-        k, asked = min(AREA, len(index)), np.unique(np.concatenate([described, noisy, lined]))
-        reach = knn(index, at_places(index, asked), k).distances[:, -1]
-        deep = window.depth(index.at(asked))
-        if window.endless or (len(index) >= AREA and (reach < deep).all()):
+        asked = np.unique(np.concatenate([described, noisy, lined]))
+        reach = knn(index, at_places(index, asked), min(AREA, len(index))).distances[:, -1]
+        if (window.endless and near.all()) or (len(index) >= AREA and (reach < side).all()):
             break
-        halo *= 2
+        side *= 2
     features, spacing = describe_places(index, described)
     return {
         "features": features,
@@ -52,8 +53,20 @@ def _measure(plan: Plan, tile: int) -> dict[str, np.ndarray]:
         "noise": noise_at(index, noisy),
         "lines": on_lines(index, lined) if len(index) >= AREA else np.zeros(len(lined), bool),
         "few": index.at(few),
-        "read": np.array(len(xyz)),
     }
+
+
+def _cells_around(xyz: np.ndarray, picked: np.ndarray, side: float) -> np.ndarray:
+    """Say which points (N, 3) lie in a cell with a picked point, seen from above, or in one beside it, (N,) bool."""
+    if picked.all():
+        return picked
+    cell = np.floor(xyz[:, :2] / side)
+    column, row = (cell - cell.min(axis=0) + 1).astype(np.int64).T
+    filled = np.zeros((column.max() + 2, row.max() + 2), bool)
+    filled[column[picked], row[picked]] = True
+    for axis in (0, 1):
+        filled = filled | np.roll(filled, 1, axis) | np.roll(filled, -1, axis)
+    return filled[column, row]
 
 
 @dataclass(frozen=True, eq=False)

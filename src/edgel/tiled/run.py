@@ -230,8 +230,9 @@ def _passes(engine: Engine, plan: Plan) -> None:
     whole = merge_measures(plan)
     _raise_for(engine.run("classifying", _classify, [(plan.folder, whole, tile) for tile in tiles]), "tile", names)
     line = draw_line(plan, whole)
-    _raise_for(engine.run("linking", _link, [(plan.folder, whole, line, tile) for tile in tiles]), "tile", names)
-    merge_chains(plan)
+    if not line.is_plain:
+        _raise_for(engine.run("linking", _link, [(plan.folder, line, tile) for tile in tiles]), "tile", names)
+        merge_chains(plan)
     _raise_for(engine.run("placing", _label, [(plan.folder, whole, line, tile) for tile in tiles]), "tile", names)
 
 
@@ -243,8 +244,8 @@ def _classify(folder: Path, whole: Any, tile: int) -> None:
     classify_tile(Plan.read(folder), whole, tile)
 
 
-def _link(folder: Path, whole: Any, line: Any, tile: int) -> None:
-    link_tile(Plan.read(folder), whole, line, tile)
+def _link(folder: Path, line: Any, tile: int) -> None:
+    link_tile(Plan.read(folder), line, tile)
 
 
 def _label(folder: Path, whole: Any, line: Any, tile: int) -> None:

@@ -148,7 +148,7 @@ class Spool:
         return np.load(place / "blocks.npy"), np.load(place / "starts.npy")
 
     def load(self, box: Box) -> tuple[np.ndarray, np.ndarray]:
-        """Return the points (N, 3) in a box and their keys (N,) int64, ascending: file and row."""
+        """Return the points (N, 3) in a box and their keys (N,) int64, file and row: ascending at one place."""
         points, keys = [np.zeros((0, 3))], [np.zeros(0, np.int64)]
         for part in self.parts:
             if not part.num_points or not box.touches(part.low[:2], part.high[:2]):
@@ -156,13 +156,16 @@ class Spool:
             place = self.folder / f"{part.number:06d}"
             (blocks, starts), xyz = self.blocks_of(part), np.load(place / "xyz.npy", mmap_mode="r")
             rows = np.load(place / "rows.npy", mmap_mode="r")
-            for block in np.flatnonzero(box.touches(blocks * part.side, (blocks + 1) * part.side)):
-                some = np.array(xyz[starts[block] : starts[block + 1]])
-                kept = box.holds(some)
-                if self.without_origin:
-                    kept &= (some != 0).any(axis=1)
-                points.append(some[kept])
-                keys.append((part.number << ROWS) + rows[starts[block] : starts[block + 1]][kept])
-        key = np.concatenate(keys)
-        order = np.argsort(key)
-        return np.concatenate(points)[order], key[order]
+            inside = np.flatnonzero(box.touches(blocks * part.side, (blocks + 1) * part.side))
+            # Blocks that follow one another are read at once.
+            for run in np.split(inside, np.flatnonzero(np.diff(inside) > 1) + 1):
+                if len(run):
+                    stretch = slice(starts[run[0]], starts[run[-1] + 1])
+                    points.append(np.array(xyz[stretch]))
+                    keys.append((part.number << ROWS) + rows[stretch])
+        joined, key = np.concatenate(points), np.concatenate(keys)
+        del points, keys
+        kept = box.holds(joined)
+        if self.without_origin:
+            kept &= (joined != 0).any(axis=1)
+        return joined[kept], key[kept]
