@@ -2,18 +2,20 @@
 
 import json
 import os
+import socket
 import subprocess
 import sys
 from collections import namedtuple
 from itertools import pairwise
 from pathlib import Path
 
+import laspy
 import numpy as np
 import pytest
 
 import edgel
 from edgel import tiled
-from edgel.tiled import classify, engine, run
+from edgel.tiled import aside, classify, engine, run
 from edgel.tiled.plan import Plan
 
 FIELDS = ("kind", "strength", "position", "position_std", "scale", "direction", "normals", "angle", "convex")
@@ -79,9 +81,12 @@ def test_a_run_that_was_killed_goes_on(files, whole, tmp_path):
     kept = {path: path.stat().st_mtime_ns for path in (out / "work").rglob("*.npz")}
     assert kept
     (out / "work" / "label").mkdir(exist_ok=True)
-    (out / "work" / "label" / "000000.123.part.npz").write_bytes(b"half")  # what a kill may leave
+    dead = f"{socket.gethostname()}.{2**22 + 1}.part"  # what a kill may leave: no process has such a number
+    (out / "work" / "label" / f"000000.npz.{dead}").write_bytes(b"half")
+    (out / "work" / "spool" / f"000000.{dead}").mkdir()
     found = tiled.detect(files, out, tile_points=3_500)
     check_same(found, whole, lengths_of(files))
+    assert not list(out.rglob("*.part"))
     assert {path: path.stat().st_mtime_ns for path in kept} == kept  # nothing was done twice
     again = {path: path.stat().st_mtime_ns for path in out.rglob("*.np[yz]")}
     tiled.detect(files, out, tile_points=3_500)
@@ -160,6 +165,50 @@ def test_a_disk_that_is_too_small_is_told_before(files, tmp_path, monkeypatch):
     monkeypatch.setattr("shutil.disk_usage", lambda path: usage(10, 9, 1))
     with pytest.raises(OSError, match="larger disk"):
         tiled.detect(files, tmp_path / "out")
+
+
+def test_a_disk_that_fills_up_is_told_by_what_the_first_tiles_took(files, whole, tmp_path, monkeypatch):
+    usage, took = namedtuple("usage", "total used free"), sum(os.path.getsize(file) for file in files) * 57 // 24
+    monkeypatch.setattr("shutil.disk_usage", lambda path: usage(10**12, 0, int(took * 1.01)))
+    with pytest.raises(OSError, match="go on with the same call"):
+        tiled.detect(files, tmp_path / "out", tile_points=3_500)
+    work = tmp_path / "out" / "work"
+    assert len(list((work / "classify").iterdir())) < len(Plan.read(work).tiles)
+    monkeypatch.undo()
+    check_same(tiled.detect(files, tmp_path / "out", tile_points=3_500), whole, lengths_of(files))
+
+
+def test_what_others_are_writing_is_left_alone(tmp_path):
+    for name in ("a.npz.elsewhere.12.part", f"b.npz.{socket.gethostname()}.{os.getpid()}.part"):
+        (tmp_path / name).touch()
+    aside.clear_stale(tmp_path)
+    assert len(list(tmp_path.iterdir())) == 2
+    os.utime(tmp_path / "a.npz.elsewhere.12.part", (1, 1))
+    aside.clear_stale(tmp_path)
+    assert [path.name[0] for path in tmp_path.iterdir()] == ["b"]
+
+
+@pytest.mark.parametrize("suffix", [".npy", ".laz", ".las"])
+def test_files_are_read_a_stretch_at_a_time(strip, tmp_path, monkeypatch, suffix):
+    rounded = strip.round(2)
+    edgel.write(tmp_path / f"a{suffix}", edgel.Cloud(rounded))
+    xyz = edgel.read(tmp_path / f"a{suffix}").xyz
+    monkeypatch.setattr("edgel.io.chunks.ROWS", 2_345)
+    found = tiled.detect([tmp_path / f"a{suffix}"], tmp_path / "out", tile_points=5_000)
+    check_same(found, edgel.detect(xyz, method="surface"), [len(strip)])
+    assert edgel.read(found.outputs[0]).xyz.tobytes() == xyz[found.edges(0).index].tobytes()
+
+
+def test_copc_comes_out(strip, tmp_path):
+    edgel.write(tmp_path / "a.laz", edgel.Cloud(strip, {"intensity": np.arange(len(strip), dtype=np.uint16)}))
+    found = tiled.detect([tmp_path / "a.laz"], tmp_path / "out", extension=".copc.laz")
+    assert found.outputs == [str(tmp_path / "out" / "a.copc.laz")]
+    with laspy.CopcReader.open(found.outputs[0]) as reader:
+        points = reader.query()
+    assert sorted(points["intensity"]) == found.edges(0).index.tolist()  # COPC has an order of its own
+    (item,) = json.loads((tmp_path / "out" / "edges.vpc").read_text())["features"]
+    assert (item["id"], item["properties"]["pc:encoding"]) == ("a", "copc")
+    assert item["properties"]["pc:count"] == found.num_edges > 0
 
 
 def test_an_index_lists_the_files(strip, tmp_path):

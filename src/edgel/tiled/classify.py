@@ -67,7 +67,7 @@ def classify_tile(plan: Plan, whole: Whole, tile: int) -> None:
 
 def _classify(plan: Plan, whole: Whole, tile: int) -> dict[str, np.ndarray]:
     spacing, step = whole.statistics.spacing, whole.statistics.cell
-    counts, shown, read, done = np.zeros((2, 1), np.int64), np.zeros(2, np.int64), 0, []
+    counts, shown, read, points, done = np.zeros((2, 1), np.int64), np.zeros(2, np.int64), 0, 0, []
     todo: list[tuple[Box, float, np.ndarray | None]] = [(plan.tiles[tile], HALO * spacing, None)]
     while todo:
         core, halo, wanted = todo.pop()
@@ -81,13 +81,13 @@ def _classify(plan: Plan, whole: Whole, tile: int) -> dict[str, np.ndarray]:
         kept = found.take(np.maximum(found.crease, found.outline) >= least_probability(plan.options.min_strength))
         sides, seen = _sides(whole, window, kept.points)
         if wanted is None:
-            shown = seen
+            shown, points = seen, int(np.count_nonzero(own))
         done.append(_fitted(plan, window, kept) | {"side": sides})
         todo += _groups(window.index.at(left), window.keys[window.index.order[left]], halo, spacing)
     parts = {name: np.concatenate([part[name] for part in done]) for name in done[0]} if done else empty()
     order = np.argsort(parts["key"])
     parts = {name: values[order] for name, values in parts.items()}
-    return {**parts, "counts": counts, "from_above": shown, "read": np.array(read)}
+    return {**parts, "counts": counts, "from_above": shown, "points": np.array(points), "read": np.array(read)}
 
 
 def _look(

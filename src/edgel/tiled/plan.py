@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -12,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from edgel.tiled.aside import made_aside
 from edgel.tiled.box import Box
 from edgel.tiled.spool import Part, Spool, load_part
 
@@ -81,19 +81,13 @@ class Plan:
         return self.folder / step / f"{tile:06d}.npz"
 
     def keep(self, step: str, tile: int, make: Callable[[], dict[str, Any]]) -> None:
-        """Make the result of a step at a tile, unless it is there: written aside, and renamed once it is whole."""
+        """Make the result of a step at a tile, unless it is there."""
         path = self.result(step, tile)
         if path.exists():
             return
         found = make()
-        path.parent.mkdir(parents=True, exist_ok=True)
-        aside = path.with_name(f"{path.stem}.{os.getpid()}.part.npz")
-        try:
-            np.savez(aside, **found)
-            os.replace(aside, path)
-        except BaseException:  # a full disk: what is half written only takes its place
-            aside.unlink(missing_ok=True)
-            raise
+        with made_aside(path) as beside, open(beside, "wb") as file:
+            np.savez(file, **found)
 
     def load(self, step: str, tile: int) -> Any:
         """Open the result of a step at a tile."""
@@ -112,9 +106,8 @@ class Plan:
                 "num_parts": self.num_parts,
             }
         )
-        aside = self.folder / f"plan.{os.getpid()}.part"
-        aside.write_text(text)
-        os.replace(aside, self.folder / "plan.json")
+        with made_aside(self.folder / "plan.json") as beside:
+            beside.write_text(text)
 
     @staticmethod
     def read(folder: Path) -> Plan:

@@ -6,6 +6,7 @@ import os
 import shutil
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,18 +14,20 @@ from edgel._detect import DEFAULT_KINDS
 from edgel._kinds import LIKELY
 from edgel.cloud import as_vector
 from edgel.edges import EdgeKind, Edges, as_kinds
+from edgel.io.files import stem
+from edgel.tiled.aside import clear_stale
 from edgel.tiled.chains import draw_line, link_tile, merge_chains
 from edgel.tiled.classify import classify_tile
+from edgel.tiled.disk import check_before, check_results
 from edgel.tiled.engine import Engine, start
 from edgel.tiled.label import label_tile
 from edgel.tiled.manifest import check_manifest
 from edgel.tiled.measure import measure, merge_measures
 from edgel.tiled.output import edges_of, write_index, write_part
 from edgel.tiled.plan import Options, Plan, cut, origin_left_out
-from edgel.tiled.spool import BYTES_A_POINT, Part, Spool, spool
+from edgel.tiled.spool import Part, Spool, spool
 
 TILE_POINTS = 3_000_000
-_EXPANDS = 8  # bytes of points in the spool for one of a compressed file, at most
 
 
 class TileError(OSError):
@@ -140,7 +143,8 @@ def detect(
     work = folder / "work"
     work.mkdir(parents=True, exist_ok=True)
     notices = check_manifest(folder, paths, options)
-    _check_disk(paths, work)
+    clear_stale(folder)
+    check_before(paths, work)
     with start(workers, scheduler, say) as engine:
         plan = _prepare(engine, paths, work, options)
         _passes(engine, plan)
@@ -167,22 +171,11 @@ def _options(kinds: Any, min_strength: float, num_neighbors: int, viewpoint: Any
 
 def _outputs(paths: Sequence[str], folder: Path, extension: str | None) -> list[str]:
     """Name the output of each file by its own name; of files of one name by their numbers too."""
-    stems = [Path(path).stem for path in paths]
+    stems = [stem(path) for path in paths]
     return [
-        str(folder / f"{stem if stems.count(stem) == 1 else f'{stem}_{number}'}{extension or Path(path).suffix}")
-        for number, (path, stem) in enumerate(zip(paths, stems, strict=True))
+        str(folder / f"{own if stems.count(own) == 1 else f'{own}_{number}'}{extension or Path(path).name[len(own) :]}")
+        for number, (path, own) in enumerate(zip(paths, stems, strict=True))
     ]
-
-
-def _check_disk(paths: Sequence[str], work: Path) -> None:
-    missing = [path for n, path in enumerate(paths) if not (work / "spool" / f"{n:06d}" / "part.json").exists()]
-    needed = _EXPANDS * sum(os.path.getsize(path) for path in missing)
-    free = shutil.disk_usage(work).free
-    if needed > free:
-        raise OSError(
-            f"{work}: about {needed / 1e9:.1f} GB are needed beside the inputs, and {free / 1e9:.1f} GB are free; name "
-            f"a folder on a larger disk ({BYTES_A_POINT} bytes a point, and the results)"
-        )
 
 
 def _prepare(engine: Engine, paths: Sequence[str], work: Path, options: Options) -> Plan:
@@ -228,7 +221,9 @@ def _passes(engine: Engine, plan: Plan) -> None:
     names = [f"x {t.low[0]:g} to {t.high[0]:g}, y {t.low[1]:g} to {t.high[1]:g}" for t in plan.tiles]
     _raise_for(engine.run("measuring", _measure, [(plan.folder, tile) for tile in tiles]), "tile", names)
     whole = merge_measures(plan)
-    _raise_for(engine.run("classifying", _classify, [(plan.folder, whole, tile) for tile in tiles]), "tile", names)
+    jobs = [(plan.folder, whole, tile) for tile in tiles]
+    check_after = partial(check_results, plan)  # as soon as some tiles tell what a point takes
+    _raise_for(engine.run("classifying", _classify, jobs, check_after), "tile", names)
     line = draw_line(plan, whole)
     if not line.is_plain:
         _raise_for(engine.run("linking", _link, [(plan.folder, line, tile) for tile in tiles]), "tile", names)

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import shutil
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -17,13 +15,15 @@ from pathlib import Path
 import numpy as np
 
 from edgel._objects import NORMALS
-from edgel.cloud import Cloud, check_points
-from edgel.io import read
+from edgel.cloud import check_points
+from edgel.io.chunks import read_chunks
+from edgel.tiled.aside import made_aside
 from edgel.tiled.box import Box
 
 ROWS = 40  # bits of a key that tell the row in its file; those above tell the file
 _PER_BLOCK = 512  # points of a block, about
 BYTES_A_POINT = 32
+_XYZ, _ROWS = "xyz.f8", "rows.i8"  # plain numbers, written stretch by stretch
 
 
 @dataclass(frozen=True)
@@ -64,18 +64,9 @@ def spool(path: str, number: int, folder: Path) -> Part:
     """Sort the points of a file by blocks into a folder below `folder`; what is there already is taken as it is."""
     place = folder / f"{number:06d}"
     if not (place / "part.json").exists():
-        cloud = read(path)
-        aside = place.with_name(f"{place.name}.{os.getpid()}.part")
-        shutil.rmtree(aside, ignore_errors=True)
-        aside.mkdir(parents=True)
-        try:
-            part = _sort(cloud, path, number, aside)
-            (aside / "part.json").write_text(json.dumps(asdict(part)))
-            shutil.rmtree(place, ignore_errors=True)
-            aside.rename(place)
-        except BaseException:  # a full disk: what is half written only takes its place
-            shutil.rmtree(aside, ignore_errors=True)
-            raise
+        with made_aside(place) as beside:
+            beside.mkdir()
+            (beside / "part.json").write_text(json.dumps(asdict(_sort(path, number, beside))))
     return load_part(place)
 
 
@@ -85,39 +76,56 @@ def load_part(place: Path) -> Part:
     return Part(**{**stored, "low": tuple(stored["low"]), "high": tuple(stored["high"])})
 
 
-def _sort(cloud: Cloud, path: str, number: int, aside: Path) -> Part:
-    if cloud.is_organized or "scan_index" in cloud.attributes:
-        raise ValueError(
-            f"{path}: an organized cloud or several scans, seen from a sensor, are no part of a larger cloud; run each "
-            "by itself, without as-one"
-        )
-    checked = check_points(cloud, minimum=0)
-    xyz, finite = checked.xyz, checked.rows
-    low, high = (xyz.min(axis=0), xyz.max(axis=0)) if len(xyz) else (np.zeros(3), np.zeros(3))
-    area = float(np.prod(high[:2] - low[:2])) or float((high - low)[:2].max()) ** 2 or 1.0
-    side = 2.0 ** np.round(np.log2(np.sqrt(area * _PER_BLOCK / max(len(xyz), 1))))
-    block = np.floor(xyz[:, :2] / side)
-    order = np.lexsort((block[:, 1], block[:, 0]))
-    block = block[order]
-    first = np.flatnonzero(np.concatenate([[True], (np.diff(block, axis=0) != 0).any(axis=1)])) if len(xyz) else []
-    np.save(aside / "xyz.npy", xyz[order])
-    np.save(aside / "rows.npy", finite[order])
-    np.save(aside / "blocks.npy", block[first].reshape(-1, 2))
-    np.save(aside / "starts.npy", np.append(first, len(xyz)).astype(np.int64))
-    names = {"_".join(name.split()).lower() for name in cloud.attributes}
+def _sort(path: str, number: int, place: Path) -> Part:
+    """Sort each stretch of rows by blocks, one after the other: none but one has to fit into memory."""
+    rows = points = at_origin = 0
+    low, high, side, crs, normals = np.full(3, np.inf), np.full(3, -np.inf), 0.0, None, False
+    blocks, starts = [np.zeros((0, 2))], [np.zeros(0, np.int64)]
+    with open(place / _XYZ, "wb") as coordinates, open(place / _ROWS, "wb") as numbers:
+        for cloud in read_chunks(path):
+            if cloud.is_organized:
+                raise ValueError(
+                    f"{path}: an organized cloud, seen from a sensor, is no part of a larger one; run it by itself, "
+                    "without as-one"
+                )
+            checked = check_points(cloud, minimum=0)
+            xyz = checked.xyz
+            crs, normals = cloud.crs, {*NORMALS} <= {"_".join(name.split()).lower() for name in cloud.attributes}
+            if len(xyz):
+                low, high = np.minimum(low, xyz.min(axis=0)), np.maximum(high, xyz.max(axis=0))
+                side = side or _side_of(xyz)
+                block = np.floor(xyz[:, :2] / side)
+                order = np.lexsort((block[:, 1], block[:, 0]))
+                block = block[order]
+                first = np.flatnonzero(np.concatenate([[True], (np.diff(block, axis=0) != 0).any(axis=1)]))
+                xyz[order].tofile(coordinates)
+                (rows + checked.rows[order]).tofile(numbers)
+                blocks.append(block[first])
+                starts.append(points + first)
+                at_origin += int((xyz == 0).all(axis=1).sum())
+            rows, points = rows + len(cloud), points + len(xyz)
+    np.save(place / "blocks.npy", np.concatenate(blocks))
+    np.save(place / "starts.npy", np.append(np.concatenate(starts), points))
     return Part(
         number=number,
         path=path,
         sha256=hash_of(path),
-        num_rows=len(cloud),
-        num_points=len(xyz),
-        at_origin=int((xyz == 0).all(axis=1).sum()),
-        low=tuple(low.tolist()),
-        high=tuple(high.tolist()),
-        crs=cloud.crs,
-        side=float(side),
-        normals={*NORMALS} <= names,
+        num_rows=rows,
+        num_points=points,
+        at_origin=at_origin,
+        low=tuple(low.tolist() if points else [0.0] * 3),
+        high=tuple(high.tolist() if points else [0.0] * 3),
+        crs=crs,
+        side=side,
+        normals=normals,
     )
+
+
+def _side_of(xyz: np.ndarray) -> float:
+    """Return a side of blocks, a power of two, for some points as dense as these (N, 3)."""
+    extent = np.ptp(xyz[:, :2], axis=0)
+    area = float(np.prod(extent)) or float(extent.max()) ** 2 or 1.0
+    return float(2.0 ** np.round(np.log2(np.sqrt(area * _PER_BLOCK / len(xyz)))))
 
 
 def hash_of(path: str) -> str:
@@ -143,7 +151,7 @@ class Spool:
     without_origin: bool
 
     def blocks_of(self, part: Part) -> tuple[np.ndarray, np.ndarray]:
-        """Return the blocks (B, 2) of a part and where the points of each begin (B + 1,)."""
+        """Return the blocks (B, 2) of a part, some more than once, and where the points of each begin (B + 1,)."""
         place = self.folder / f"{part.number:06d}"
         return np.load(place / "blocks.npy"), np.load(place / "starts.npy")
 
@@ -154,8 +162,9 @@ class Spool:
             if not part.num_points or not box.touches(part.low[:2], part.high[:2]):
                 continue
             place = self.folder / f"{part.number:06d}"
-            (blocks, starts), xyz = self.blocks_of(part), np.load(place / "xyz.npy", mmap_mode="r")
-            rows = np.load(place / "rows.npy", mmap_mode="r")
+            (blocks, starts), shape = self.blocks_of(part), (part.num_points, 3)
+            xyz = np.memmap(place / _XYZ, np.float64, "r", shape=shape)
+            rows = np.memmap(place / _ROWS, np.int64, "r")
             inside = np.flatnonzero(box.touches(blocks * part.side, (blocks + 1) * part.side))
             # Blocks that follow one another are read at once.
             for run in np.split(inside, np.flatnonzero(np.diff(inside) > 1) + 1):
