@@ -15,6 +15,8 @@ import pytest
 
 import edgel
 from edgel import tiled
+from edgel._neighbors.kdtree import build_index
+from edgel._neighbors.scan_lines import scan_line_stretch
 from edgel.tiled import aside, classify, engine, run
 from edgel.tiled.plan import Plan
 
@@ -151,6 +153,28 @@ def test_what_is_not_one_cloud_is_refused(strip, tmp_path):
         tiled.detect([tmp_path / "grid.npy"], tmp_path / "out2")
     with pytest.raises(ValueError, match="named twice"):
         tiled.detect([tmp_path / "a.laz", tmp_path / "a.laz"], tmp_path / "out")
+
+
+def test_scan_lines_are_stretched_in_tiles_too(tmp_path):
+    rng = np.random.default_rng(5)
+    x, y = (grid.ravel() for grid in np.meshgrid(np.arange(0, 160.0, 0.2), np.arange(0, 36.0, 1.5)))
+    x, y = x + rng.uniform(-0.05, 0.05, len(x)), y + 0.005 * rng.standard_normal(len(x))
+    roof = (np.abs(x % 40 - 20) < 11) & (np.abs(y - 17) < 9)
+    z = np.where(roof, 9 + 0.6 * (9 - np.abs(y - 17)), 0) + 0.005 * rng.standard_normal(len(x))
+    xyz = np.column_stack([x, y, z])
+    wanted = edgel.detect(xyz, method="surface")
+    assert scan_line_stretch(build_index(xyz)) is not None
+    np.save(tmp_path / "lines.npy", xyz)
+    found = tiled.detect([tmp_path / "lines.npy"], tmp_path / "out", tile_points=5_000)
+    assert found.num_tiles > 2
+    check_same(found, wanted, [len(xyz)])
+    assert len(wanted) > 200
+
+
+def test_scans_of_one_file_are_points_of_the_cloud(strip, whole, tmp_path):
+    scans = np.repeat([0, 1], [10_000, len(strip) - 10_000]).astype(np.uint8)
+    edgel.write(tmp_path / "a.npz", edgel.Cloud(strip, {"scan_index": scans}))
+    check_same(tiled.detect([tmp_path / "a.npz"], tmp_path / "out", tile_points=5_000), whole, [len(strip)])
 
 
 def test_much_noise_is_refused(strip, tmp_path):

@@ -78,27 +78,40 @@ class Bounds:
         return Bounds(leaf, radii)
 
 
-def with_context_of(index: NeighborIndex, bounds: Bounds, asked: np.ndarray, depth: np.ndarray) -> np.ndarray:
+def with_context_of(
+    index: NeighborIndex, bounds: Bounds, asked: np.ndarray, depth: np.ndarray, stretch: np.ndarray | None = None
+) -> np.ndarray:
     """Return some places, `asked` (N,) bool, and those whose evidence is among the context of one of them, (N,) bool.
 
-    `depth` (N,) is how deep each lies in a region of which all places are asked for: most need not be looked at.
+    `depth` (N,) is how deep each lies in a region of which all places are asked for: most need not be looked at. Takes
+    the stretch (3, N) on scan lines, where there is one: then all are.
     """
     near = asked.copy()
-    outer = np.flatnonzero(asked & (bounds.radii[0][bounds.leaf] >= depth))
-    if len(outer):
-        visit_neighbors(_mark, at_places(index, outer), index, min(_CHAIN[0], len(index)), near)
+    outer = asked if stretch is not None else asked & (bounds.radii[0][bounds.leaf] >= depth)
+    places = np.flatnonzero(outer)
+    if len(places):
+        queries = at_places(index, places, stretch=stretch)
+        visit_neighbors(_mark, queries, index, min(_CHAIN[0], len(index)), near)
     return near
 
 
-def settled(index: NeighborIndex, leaves: Leaves, bounds: Bounds, depth: np.ndarray, asked: np.ndarray) -> np.ndarray:
+def settled(
+    index: NeighborIndex,
+    leaves: Leaves,
+    bounds: Bounds,
+    depth: np.ndarray,
+    asked: np.ndarray,
+    stretch: np.ndarray | None = None,
+) -> np.ndarray:
     """Say at which of some places, `asked` (N,) bool, nothing can change that lies farther away than a depth (N,).
 
-    Most are told by a bound on how far all around reach; the others are looked at one by one (`evidence_reach`).
+    Most are told by a bound on how far all around reach; the others, and all on scan lines, are looked at one by one
+    (`evidence_reach`).
     """
-    sure = asked & (_farthest(index, bounds) < depth)
+    sure = asked & (_farthest(index, bounds) < depth if stretch is None else False)
     places = np.flatnonzero(asked & ~sure)
     if len(places):
-        sure[places] = evidence_reach(index, leaves, places) < depth[places]
+        sure[places] = evidence_reach(index, leaves, places, stretch) < depth[places]
     return sure
 
 

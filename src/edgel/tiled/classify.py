@@ -9,6 +9,7 @@ import numpy as np
 from edgel._neighbors.kdtree import NeighborIndex, build_index
 from edgel._neighbors.knn import knn
 from edgel._neighbors.queries import at_places, at_points
+from edgel._neighbors.scan_lines import stretch_along_lines
 from edgel._range_image import pixel_size, raster, sides_in
 from edgel._surface import classify, screen
 from edgel._surface.classify import Classification
@@ -37,6 +38,8 @@ class Window:
         Of the points.
     depth, core_depth : (N,) float64
         How deep in the box, and in the core, each place lies; negative outside.
+    stretch : (3, N) float64 or None
+        Of the places, where the cloud has scan lines.
     endless : bool
         Whether the box holds everything.
     """
@@ -46,18 +49,20 @@ class Window:
     depth: np.ndarray
     core_depth: np.ndarray
     core: np.ndarray
+    stretch: np.ndarray | None
     endless: bool
 
 
-def open_window(plan: Plan, core: Box, halo: float, step: float) -> Window | None:
+def _open_window(plan: Plan, whole: Whole, core: Box, halo: float) -> Window | None:
     """Read the points around a core; None if there are none in it."""
-    box = core.grown(halo, step).without_end(*plan.bounds)
+    box = core.grown(halo, whole.statistics.cell).without_end(*plan.bounds)
     xyz, keys = plan.spool.load(box)
     if not core.holds(xyz).any():
         return None
     index = build_index(xyz)
     places = np.ascontiguousarray(index.xyz.T)
-    return Window(index, keys, box.depth(places), core.depth(places), core.holds(places), box.endless)
+    stretch = stretch_along_lines(index) if whole.on_lines else None
+    return Window(index, keys, box.depth(places), core.depth(places), core.holds(places), stretch, box.endless)
 
 
 def classify_tile(plan: Plan, whole: Whole, tile: int) -> None:
@@ -66,12 +71,12 @@ def classify_tile(plan: Plan, whole: Whole, tile: int) -> None:
 
 
 def _classify(plan: Plan, whole: Whole, tile: int) -> dict[str, np.ndarray]:
-    spacing, step = whole.statistics.spacing, whole.statistics.cell
+    spacing = whole.statistics.spacing
     counts, shown, read, points, done = np.zeros((2, 1), np.int64), np.zeros(2, np.int64), 0, 0, []
     todo: list[tuple[Box, float, np.ndarray | None]] = [(plan.tiles[tile], HALO * spacing, None)]
     while todo:
         core, halo, wanted = todo.pop()
-        window = open_window(plan, core, halo, step)
+        window = _open_window(plan, whole, core, halo)
         if window is None:
             continue
         read += len(window.keys)
@@ -95,11 +100,13 @@ def _look(
 ) -> tuple[Classification, np.ndarray]:
     """Classify the places of a window that are asked for; returns what is sure, and the places (L,) that are not."""
     index = window.index
-    screening = screen(index, whole.statistics)
+    screening = screen(index, whole.statistics, stretch=window.stretch)
     bounds = Bounds.of(index, screening.leaves)
     inner = window.core_depth if all_of_core else np.zeros(len(index))
-    found = classify(index, screening, with_context_of(index, bounds, own, inner))
-    sure = own if window.endless else settled(index, screening.leaves, bounds, window.depth, own)
+    found = classify(index, screening, with_context_of(index, bounds, own, inner, window.stretch))
+    sure = own
+    if not window.endless:
+        sure = settled(index, screening.leaves, bounds, window.depth, own, window.stretch)
     if plan.options.num_neighbors > FITS[-1][0] and not window.endless:  # farther than evidence ever asks
         sure = sure.copy()
         sure[sure] = _within(window, np.flatnonzero(sure), plan.options.num_neighbors)
@@ -122,7 +129,7 @@ def _fitted(plan: Plan, window: Window, kept: Classification) -> dict[str, np.nd
     k = min(options.num_neighbors, len(index))
     viewpoint = None if options.viewpoint is None else np.array(options.viewpoint)
     creases, ends = kept.crease >= least, kept.outline >= least
-    fits = fit_locally(index, index, None, kept, kept.points, creases, ends, k, viewpoint)
+    fits = fit_locally(index, index, window.stretch, kept, kept.points, creases, ends, k, viewpoint)
     nearest = np.full((len(kept.points), NEAREST), -1)
     count, farthest = min(NEAREST, len(index)), np.zeros(len(kept.points))
     if len(kept.points):

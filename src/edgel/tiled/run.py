@@ -22,7 +22,7 @@ from edgel.tiled.disk import check_before, check_results
 from edgel.tiled.engine import Engine, start
 from edgel.tiled.label import label_tile
 from edgel.tiled.manifest import check_manifest
-from edgel.tiled.measure import measure, merge_measures
+from edgel.tiled.measure import lies_on_lines, measure, measure_on_lines, merge_measures
 from edgel.tiled.output import edges_of, write_index, write_part
 from edgel.tiled.plan import Options, Plan, cut, origin_left_out
 from edgel.tiled.spool import Part, Spool, spool
@@ -220,6 +220,9 @@ def _passes(engine: Engine, plan: Plan) -> None:
     tiles = range(len(plan.tiles))
     names = [f"x {t.low[0]:g} to {t.high[0]:g}, y {t.low[1]:g} to {t.high[1]:g}" for t in plan.tiles]
     _raise_for(engine.run("measuring", _measure, [(plan.folder, tile) for tile in tiles]), "tile", names)
+    if lies_on_lines(plan):
+        jobs = [(plan.folder, tile) for tile in tiles]
+        _raise_for(engine.run("measuring on lines", _measure_on_lines, jobs), "tile", names)
     whole = merge_measures(plan)
     jobs = [(plan.folder, whole, tile) for tile in tiles]
     check_after = partial(check_results, plan)  # as soon as some tiles tell what a point takes
@@ -233,6 +236,10 @@ def _passes(engine: Engine, plan: Plan) -> None:
 
 def _measure(folder: Path, tile: int) -> None:
     measure(Plan.read(folder), tile)
+
+
+def _measure_on_lines(folder: Path, tile: int) -> None:
+    measure_on_lines(Plan.read(folder), tile)
 
 
 def _classify(folder: Path, whole: Any, tile: int) -> None:
