@@ -9,6 +9,7 @@ import numpy as np
 from edgel._faces import Faces
 from edgel._neighbors.kdtree import NeighborIndex, build_index
 from edgel._neighbors.scan_lines import scan_line_stretch
+from edgel._neighbors.spacing import cloud_spacing
 from edgel._stages import Stages
 from edgel._surface.classify import Classification, classify
 from edgel._surface.coarser import CELL, FAINT, FEWEST, Carried, apart, carry, means_of_cells
@@ -16,7 +17,7 @@ from edgel._surface.faces import fit_locally
 from edgel._surface.line import Strengths, strengths
 from edgel._surface.plane_scales import SCALES
 from edgel._surface.screen import Screening, screen
-from edgel._surface.smoothing import cloud_spacing, smoothed
+from edgel._surface.smoothing import smoothed
 from edgel._surface.statistics import cloud_statistics
 from edgel.edges import OUTLINES, EdgeKind
 
