@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 import edgel
-from edgel import tiled
+from edgel import synth, tiled
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.scan_lines import scan_line_stretch
-from edgel.tiled import aside, classify, engine, run
+from edgel.tiled import aside, classify, engine, passes
 from edgel.tiled.plan import Plan
 
 FIELDS = ("kind", "strength", "position", "position_std", "scale", "direction", "normals", "angle", "convex")
@@ -55,6 +55,43 @@ def test_a_sensor_tells_the_outside_in_tiles_too(files, strip, tmp_path):
     found = tiled.detect(files, tmp_path / "out", tile_points=3_000, viewpoint=above, kinds="crease", min_strength=0.3)
     check_same(found, wanted, lengths_of(files))
     assert (wanted.convex == 1).any()
+
+
+@pytest.mark.parametrize("tile_points", [2_000, 6_000])
+def test_the_outside_of_a_whole_surface_is_told_in_tiles(tmp_path, tile_points):
+    solid = synth.sample(synth.stepped_block(), pattern="blue_noise", spacing=0.9, noise=0.05, seed=3)
+    xyz = np.concatenate([solid.cloud.xyz, solid.cloud.xyz + [90.0, 4.0, 0.0]])
+    wanted = edgel.detect(xyz, method="surface", orient="outward")
+    names = [str(tmp_path / f"{number}.npy") for number in range(2)]
+    for name, part in zip(names, (xyz[::2], xyz[1::2]), strict=True):
+        np.save(name, part)
+    order = np.concatenate([np.arange(0, len(xyz), 2), np.arange(1, len(xyz), 2)])
+    wanted = edgel.detect(xyz[order], method="surface", orient="outward")
+    found = tiled.detect(names, tmp_path / "out", tile_points=tile_points, orient="outward")
+    assert found.num_tiles > 1
+    check_same(found, wanted, lengths_of(names))
+    assert found.edges(0).orientation == "outward"
+    assert (wanted.convex == 1).sum() > 100
+    assert (wanted.convex == -1).sum() > 10
+
+
+def test_normals_of_the_cloud_tell_the_outside_in_tiles(files, strip, tmp_path):
+    up = np.tile([0.0, 0.1, -1.0], (len(strip), 1))
+    names, first = [], 0
+    for number, length in enumerate(lengths_of(files)):
+        rows = slice(first, first + length)
+        columns = dict(zip(("nx", "ny", "nz"), up[rows].T, strict=True))
+        names.append(str(tmp_path / f"with{number}.npz"))
+        edgel.write(names[-1], edgel.Cloud(strip[rows], columns))
+        first += length
+    cloud = edgel.Cloud(strip, dict(zip(("nx", "ny", "nz"), up.T, strict=True)))
+    wanted = edgel.detect(cloud, method="surface")
+    assert wanted.orientation == "normals"
+    found = tiled.detect(names, tmp_path / "out", tile_points=3_000)
+    check_same(found, wanted, lengths_of(files))
+    assert (wanted.convex != 0).sum() > 100
+    with pytest.raises(ValueError, match=r"with0.npz: has normals of its own .*line1.npy has none"):
+        tiled.detect([names[0], files[1]], tmp_path / "mixed")
 
 
 def test_two_workers_give_the_same(files, whole, tmp_path):
@@ -104,7 +141,7 @@ def test_a_tile_that_fails_is_tried_alone_and_named(files, whole, tmp_path, monk
             raise OSError("no luck")
         real(plan, answer, tile)
 
-    monkeypatch.setattr(run, "classify_tile", failing)
+    monkeypatch.setattr(passes, "classify_tile", failing)
     with pytest.raises(tiled.TileError, match=r"tile 1 \(x .*no luck.*all others are done"):
         tiled.detect(files, tmp_path / "out", tile_points=3_500)
     assert calls == [*range(max(calls) + 1), 1]  # all, and that one once more

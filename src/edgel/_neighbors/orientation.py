@@ -57,15 +57,20 @@ def who_knows(orient: str, cloud: Cloud, *, sensor: bool) -> tuple[str, np.ndarr
     """
     if orient == OUTWARD or sensor:
         return orient if orient == OUTWARD else SENSOR, None
-    own = _own_normals(cloud)
+    own = own_normals(cloud)
     return UNKNOWN if own is None else OWN, own
 
 
-def _own_normals(cloud: Cloud) -> np.ndarray | None:
+def has_normals(cloud: Cloud) -> bool:
+    """Whether a cloud has columns nx, ny and nz."""
+    return {*NORMALS} <= {"_".join(name.split()).lower() for name in cloud.attributes}
+
+
+def own_normals(cloud: Cloud) -> np.ndarray | None:
     """Return the normals (N, 3) that came with a cloud as nx, ny, nz, None where it has none."""
-    names = {"_".join(name.split()).lower(): name for name in cloud.attributes}
-    if not {*NORMALS} <= set(names):
+    if not has_normals(cloud):
         return None
+    names = {"_".join(name.split()).lower(): name for name in cloud.attributes}
     columns = [cloud.attributes[names[name]] for name in NORMALS]
     if any(column.ndim != 1 or column.dtype.kind not in "fiu" for column in columns):
         return None

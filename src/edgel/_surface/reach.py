@@ -41,7 +41,7 @@ def evidence_reach(
         visit_neighbors(_mark, at_places(index, asked[-1], stretch=stretch), index, k, near)
         asked.append(np.flatnonzero(near))
     for count, some in zip(reversed(_CHAIN), reversed(asked), strict=True):
-        visit = _or_radius if count == SCALES[-1] else _and_farthest
+        visit = _or_radius if count == SCALES[-1] else and_farthest
         result = np.zeros(len(index))
         queries = at_places(index, some, some, stretch)  # no point lies farther than it does stretched
         visit_neighbors(visit, queries, index, min(count, len(index)), farthest, of_stretch, result)
@@ -186,7 +186,8 @@ def _or_radius(first, places, squared, queries, targets, xyz, own, least, result
 
 
 @kernel
-def _and_farthest(first, places, squared, queries, targets, xyz, theirs, least, result):
+def and_farthest(first, places, squared, queries, targets, xyz, theirs, least, result):
+    """Write how far away the farthest neighbour lies, or what is the least, and what is the most of `theirs` (N,)."""
     for q in range(places.shape[0]):
         row, farthest = targets[first + q], 0.0
         for i in range(places.shape[1]):

@@ -53,7 +53,7 @@ class Window:
     endless: bool
 
 
-def _open_window(plan: Plan, whole: Whole, core: Box, halo: float) -> Window | None:
+def open_window(plan: Plan, whole: Whole, core: Box, halo: float) -> Window | None:
     """Read the points around a core; None if there are none in it."""
     box = core.grown(halo, whole.statistics.cell).without_end(*plan.bounds)
     xyz, keys = plan.spool.load(box)
@@ -76,7 +76,7 @@ def _classify(plan: Plan, whole: Whole, tile: int) -> dict[str, np.ndarray]:
     todo: list[tuple[Box, float, np.ndarray | None]] = [(plan.tiles[tile], HALO * spacing, None)]
     while todo:
         core, halo, wanted = todo.pop()
-        window = _open_window(plan, whole, core, halo)
+        window = open_window(plan, whole, core, halo)
         if window is None:
             continue
         read += len(window.keys)

@@ -9,6 +9,7 @@ import numpy as np
 from edgel._labels import Labels
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import knn
+from edgel._neighbors.normals import UNKNOWN
 from edgel._surface.faces import LocalFits
 from edgel._surface.line import SURE as PLAIN
 from edgel._surface.line import Faint, strength_of, with_faint
@@ -44,7 +45,7 @@ def _label(plan: Plan, whole: Whole, line: Line, tile: int) -> dict[str, np.ndar
     viewpoint = None if options.viewpoint is None else np.array(options.viewpoint)
     outermost = _outermost(plan, plan.tiles[tile], fits.xyz, HALO * whole.statistics.spacing / 4)
     faces = fits.faces(kind[edge], outermost, viewpoint)
-    if viewpoint is None:  # then nobody knows the outside
+    if plan.orientation == UNKNOWN:
         faces = replace(faces, convex=np.zeros_like(faces.convex))
     return {"key": key[edge], "kind": kind[edge], "strength": labels.strength[edge], **vars(faces)}
 

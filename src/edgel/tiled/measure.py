@@ -11,6 +11,7 @@ from edgel._neighbors.knn import knn
 from edgel._neighbors.queries import at_places
 from edgel._neighbors.scan_lines import AREA, are_lines, on_lines, stretch_along_lines, stretch_reach
 from edgel._neighbors.scan_lines import SAMPLE as LINES_SAMPLE
+from edgel._neighbors.spacing import disc_radii, rounded_spacing
 from edgel._range_image import FEW, direction_that_explains
 from edgel._surface.plane_scales import NUM_FEATURES, SCALES
 from edgel._surface.smoothing import SAMPLE as NOISE_SAMPLE
@@ -46,12 +47,13 @@ def _measure(plan: Plan, tile: int) -> dict[str, np.ndarray]:
                 "features": features,
                 "spacing": spacing,
                 "noise": noise_at(index, noisy),
+                "disc": disc_radii(index, noisy),
                 "lines": on_lines(index, lined) if len(index) >= AREA else np.zeros(len(lined), bool),
                 "few": index.at(few),
             }
         side *= 2
     none = np.zeros(0)
-    return {**_nothing(), "noise": none, "lines": none, "few": np.zeros((0, 3))}
+    return {**_nothing(), "noise": none, "disc": none, "lines": none, "few": np.zeros((0, 3))}
 
 
 def _measure_on_lines(plan: Plan, tile: int) -> dict[str, np.ndarray]:
@@ -119,11 +121,14 @@ class Whole:
         Whether the view from above shows nearly all of a sample of the points, so that it tells near from far sides.
     on_lines : bool
         Whether the points lie on scan lines.
+    cloud_spacing : float
+        See `edgel._neighbors.spacing.cloud_spacing`.
     """
 
     statistics: Statistics
     from_above: bool
     on_lines: bool
+    cloud_spacing: float
 
 
 def lies_on_lines(plan: Plan) -> bool:
@@ -140,7 +145,7 @@ def merge_measures(plan: Plan) -> Whole:
     ValueError
         If the cloud is one that only a whole can be seen of: too noisy, or shown best from one side.
     """
-    noise, few = _gather(plan, "measure", "noise", "few")
+    noise, disc, few = _gather(plan, "measure", "noise", "disc", "few")
     if share_of(noise_of(noise)) > 0:
         raise ValueError(
             f"points: noise of {noise_of(noise):.2f} spacings off the surface has to be smoothed away first, which is "
@@ -154,7 +159,9 @@ def merge_measures(plan: Plan) -> Whole:
         )
     lines = lies_on_lines(plan)
     features, spacing = _gather(plan, "measure on lines" if lines else "measure", "features", "spacing")
-    return Whole(statistics_of(features.astype(np.float32), spacing), direction is not None, lines)
+    return Whole(
+        statistics_of(features.astype(np.float32), spacing), direction is not None, lines, rounded_spacing(disc)
+    )
 
 
 def _gather(plan: Plan, step: str, *names: str) -> list[np.ndarray]:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from edgel._faces import Faces
-from edgel._neighbors.normals import SENSOR, UNKNOWN
+from edgel._neighbors.normals import OUTWARD, OWN
 from edgel.edges import Edges
 from edgel.io import write
 from edgel.io.chunks import read_rows
@@ -35,12 +35,16 @@ def edges_of(plan: Plan, part: Part) -> Edges:
             keys.append(found["key"][mine])
             for name in _FIELDS:
                 columns[name].append(found[name][mine])
+        if plan.orientation in (OUTWARD, OWN):  # then faces were turned once all were known
+            with plan.load("turn", tile) as turned:
+                for name in turned.files:
+                    columns[name][-1] = turned[name][mine]
     key = np.concatenate(keys)
     order = np.argsort(key)
     return Edges(
         index=key[order] & ((1 << ROWS) - 1),
         **{name: np.concatenate(parts)[order] for name, parts in columns.items()},
-        orientation=UNKNOWN if plan.options.viewpoint is None else SENSOR,
+        orientation=plan.orientation,
         num_points=part.num_rows,
         num_dropped=part.num_rows - part.num_points,
         method="surface",

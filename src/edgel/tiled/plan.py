@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from edgel._neighbors.normals import OUTWARD, OWN, SENSOR, UNKNOWN
 from edgel.tiled.aside import made_aside
 from edgel.tiled.box import Box
 from edgel.tiled.spool import Part, Spool, load_part
@@ -26,6 +27,7 @@ class Options:
     min_strength: float
     num_neighbors: int
     viewpoint: tuple[float, float, float] | None
+    orient: str
     tile_points: int
 
 
@@ -60,6 +62,13 @@ class Plan:
         """Finite points, without those that stand for no return."""
         spool = self.spool
         return sum(part.num_points - (part.at_origin if spool.without_origin else 0) for part in spool.parts)
+
+    @cached_property
+    def orientation(self) -> str:
+        """Who knows the outside: see `edgel.Edges.orientation`."""
+        if self.options.orient == OUTWARD or self.options.viewpoint is not None:
+            return OUTWARD if self.options.orient == OUTWARD else SENSOR
+        return OWN if any(part.normals for part in self.spool.parts) else UNKNOWN
 
     @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:

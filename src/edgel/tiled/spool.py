@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from edgel._objects import NORMALS
+from edgel._neighbors.orientation import has_normals, own_normals
 from edgel.cloud import check_points
 from edgel.io.chunks import read_chunks
 from edgel.tiled.aside import made_aside
@@ -23,7 +23,7 @@ from edgel.tiled.box import Box
 ROWS = 40  # bits of a key that tell the row in its file; those above tell the file
 _PER_BLOCK = 512  # points of a block, about
 BYTES_A_POINT = 32
-_XYZ, _ROWS = "xyz.f8", "rows.i8"  # plain numbers, written stretch by stretch
+_XYZ, _ROWS, _NORMALS = "xyz.f8", "rows.i8", "normals.f8"  # plain numbers, written stretch by stretch
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Part:
     side : float
         Of the blocks, a power of two.
     normals : bool
-        Whether the file has normals of its own.
+        Whether the file has normals of its own, any of which is not 0.
     """
 
     number: int
@@ -81,7 +81,11 @@ def _sort(path: str, number: int, place: Path) -> Part:
     rows = points = at_origin = 0
     low, high, side, crs, normals = np.full(3, np.inf), np.full(3, -np.inf), 0.0, None, False
     blocks, starts = [np.zeros((0, 2))], [np.zeros(0, np.int64)]
-    with open(place / _XYZ, "wb") as coordinates, open(place / _ROWS, "wb") as numbers:
+    with (
+        open(place / _XYZ, "wb") as coordinates,
+        open(place / _ROWS, "wb") as numbers,
+        open(place / _NORMALS, "wb") as directions,
+    ):
         for cloud in read_chunks(path):
             if cloud.is_organized:
                 raise ValueError(
@@ -90,7 +94,8 @@ def _sort(path: str, number: int, place: Path) -> Part:
                 )
             checked = check_points(cloud, minimum=0)
             xyz = checked.xyz
-            crs, normals = cloud.crs, {*NORMALS} <= {"_".join(name.split()).lower() for name in cloud.attributes}
+            crs, own = cloud.crs, own_normals(cloud)
+            normals |= own is not None
             if len(xyz):
                 low, high = np.minimum(low, xyz.min(axis=0)), np.maximum(high, xyz.max(axis=0))
                 side = side or _side_of(xyz)
@@ -99,6 +104,9 @@ def _sort(path: str, number: int, place: Path) -> Part:
                 block = block[order]
                 first = np.flatnonzero(np.concatenate([[True], (np.diff(block, axis=0) != 0).any(axis=1)]))
                 xyz[order].tofile(coordinates)
+                if has_normals(cloud):
+                    own = np.zeros(cloud.xyz.shape) if own is None else own
+                    own[checked.rows[order]].tofile(directions)
                 (rows + checked.rows[order]).tofile(numbers)
                 blocks.append(block[first])
                 starts.append(points + first)
@@ -157,7 +165,16 @@ class Spool:
 
     def load(self, box: Box) -> tuple[np.ndarray, np.ndarray]:
         """Return the points (N, 3) in a box and their keys (N,) int64, file and row: ascending at one place."""
-        points, keys = [np.zeros((0, 3))], [np.zeros(0, np.int64)]
+        xyz, key, _ = self._load(box, with_normals=False)
+        return xyz, key
+
+    def load_normals(self, box: Box) -> tuple[np.ndarray, np.ndarray]:
+        """Return the keys (N,) of the points in a box and the normals (N, 3) that came with them, 0 where none did."""
+        _, key, normals = self._load(box, with_normals=True)
+        return key, normals
+
+    def _load(self, box: Box, *, with_normals: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        points, keys, normals = [np.zeros((0, 3))], [np.zeros(0, np.int64)], [np.zeros((0, 3))]
         for part in self.parts:
             if not part.num_points or not box.touches(part.low[:2], part.high[:2]):
                 continue
@@ -165,6 +182,7 @@ class Spool:
             (blocks, starts), shape = self.blocks_of(part), (part.num_points, 3)
             xyz = np.memmap(place / _XYZ, np.float64, "r", shape=shape)
             rows = np.memmap(place / _ROWS, np.int64, "r")
+            own = np.memmap(place / _NORMALS, np.float64, "r", shape=shape) if with_normals and part.normals else None
             inside = np.flatnonzero(box.touches(blocks * part.side, (blocks + 1) * part.side))
             # Blocks that follow one another are read at once.
             for run in np.split(inside, np.flatnonzero(np.diff(inside) > 1) + 1):
@@ -172,9 +190,11 @@ class Spool:
                     stretch = slice(starts[run[0]], starts[run[-1] + 1])
                     points.append(np.array(xyz[stretch]))
                     keys.append((part.number << ROWS) + rows[stretch])
+                    if with_normals:
+                        normals.append(np.zeros((len(keys[-1]), 3)) if own is None else np.array(own[stretch]))
         joined, key = np.concatenate(points), np.concatenate(keys)
         del points, keys
         kept = box.holds(joined)
         if self.without_origin:
             kept &= (joined != 0).any(axis=1)
-        return joined[kept], key[kept]
+        return joined[kept], key[kept], np.concatenate(normals)[kept] if with_normals else normals[0]
