@@ -104,7 +104,12 @@ class Plan:
 
     def around(self, box: Box) -> list[int]:
         """Return the tiles that a box touches."""
-        return [i for i, tile in enumerate(self.tiles) if box.touches(tile.low, tile.high)]
+        return np.flatnonzero(box.touches(*self._corners)).tolist()
+
+    @cached_property
+    def _corners(self) -> tuple[np.ndarray, np.ndarray]:
+        """Corners (T, 2) of all tiles."""
+        return np.array([tile.low for tile in self.tiles]), np.array([tile.high for tile in self.tiles])
 
     def save(self) -> None:
         """Write the plan for the workers."""

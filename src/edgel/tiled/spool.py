@@ -10,6 +10,7 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -163,6 +164,20 @@ class Spool:
         place = self.folder / f"{part.number:06d}"
         return np.load(place / "blocks.npy"), np.load(place / "starts.npy")
 
+    def _touched(self, box: Box) -> list[Part]:
+        """Return the parts that may have points in a box."""
+        return [self.parts[i] for i in np.flatnonzero(box.touches(*self._corners) & self._filled)]
+
+    @cached_property
+    def _corners(self) -> tuple[np.ndarray, np.ndarray]:
+        """Corners (P, 2) in plan of all parts."""
+        return np.array([part.low[:2] for part in self.parts]), np.array([part.high[:2] for part in self.parts])
+
+    @cached_property
+    def _filled(self) -> np.ndarray:
+        """Whether each part (P,) has any points."""
+        return np.array([part.num_points > 0 for part in self.parts])
+
     def load(self, box: Box) -> tuple[np.ndarray, np.ndarray]:
         """Return the points (N, 3) in a box and their keys (N,) int64, file and row: ascending at one place."""
         xyz, key, _ = self._load(box, with_normals=False)
@@ -175,9 +190,7 @@ class Spool:
 
     def _load(self, box: Box, *, with_normals: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         points, keys, normals = [np.zeros((0, 3))], [np.zeros(0, np.int64)], [np.zeros((0, 3))]
-        for part in self.parts:
-            if not part.num_points or not box.touches(part.low[:2], part.high[:2]):
-                continue
+        for part in self._touched(box):
             place = self.folder / f"{part.number:06d}"
             (blocks, starts), shape = self.blocks_of(part), (part.num_points, 3)
             xyz = np.memmap(place / _XYZ, np.float64, "r", shape=shape)
