@@ -17,6 +17,8 @@ import numpy as np
 
 import edgel
 from edgel import tiled
+from edgel.tiled.output import edges_of
+from edgel.tiled.plan import Plan
 
 SIDE = 1000  # of a file in plan, metres: a point a square metre
 FIELDS = ("kind", "strength", "position", "position_std", "scale", "direction", "normals", "angle", "convex")
@@ -79,7 +81,7 @@ def run_whole(files: list[str], out: Path) -> dict[str, Any]:
     begin = time.process_time()
     xyz = np.concatenate([np.load(file) for file in files])
     found = edgel.detect(xyz, method="surface")
-    seconds = found.seconds | {"all": time.process_time() - begin}
+    seconds = {**found.seconds, "all": time.process_time() - begin}
     out.mkdir(parents=True, exist_ok=True)
     np.savez(out / "whole.npz", index=found.index, **{name: getattr(found, name) for name in FIELDS})
     return {"points": len(xyz), "edges": len(found), "seconds": seconds}
@@ -87,8 +89,8 @@ def run_whole(files: list[str], out: Path) -> dict[str, Any]:
 
 def compare(files: list[str], out: Path, whole: Path) -> dict[str, Any]:
     """Compare the answer in tiles with the whole's, bit for bit."""
-    plan = tiled.run.Plan.read(out / "work")
-    parts = [tiled.run.edges_of(plan, part) for part in plan.spool.parts]
+    plan = Plan.read(out / "work")
+    parts = [edges_of(plan, part) for part in plan.spool.parts]
     first = np.cumsum([0, *(len(np.load(file, mmap_mode="r")) for file in files)])
     index = np.concatenate([part.index + begin for part, begin in zip(parts, first, strict=False)])
     with np.load(whole / "whole.npz") as kept:

@@ -41,7 +41,7 @@ def test_a_box_and_a_level_are_read_alone(town, tmp_path):
         info = reader.copc_info
     assert 2_000 < len(coarse) < 20_000
     x, y, _ = np.floor(
-        (np.column_stack([coarse.x, coarse.y, coarse.z]) - (info.center - info.halfsize)) / info.spacing
+        (np.column_stack([np.asarray(coarse[axis]) for axis in "xyz"]) - (info.center - info.halfsize)) / info.spacing
     ).T
     assert len(np.unique(np.stack([x, y]), axis=1).T) > 0.8 * len(coarse)  # spread out, one in each cell
     assert info.gps_max == town.attributes["gps_time"].max()

@@ -32,17 +32,7 @@ def as_copc(header: laspy.LasHeader, attributes: dict[str, np.ndarray], said: di
     """Turn a header into one of version 1.4 with a point format of COPC, before extra dimensions are declared."""
     number = header.point_format.id
     wanted = laspy.PointFormat(_FORMATS.get(number, number))
-    for extra in header.point_format.extra_dimensions:
-        wanted.add_extra_dimension(
-            laspy.ExtraBytesParams(
-                extra.name,
-                extra.type_str() or extra.dtype,
-                extra.description,
-                extra.offsets,
-                extra.scales,
-                extra.no_data,
-            )
-        )
+    wanted.dimensions += list(header.point_format.extra_dimensions)
     header.set_version_and_point_format(laspy.header.Version(1, 4), wanted)
     header.global_encoding.wkt = True  # as these formats ask for, whether there is a CRS or not
     if number in _FORMATS and "scan_angle_rank" in attributes:
@@ -78,7 +68,8 @@ def write_nodes(file: BinaryIO, header: laspy.LasHeader, record: laspy.ScaleAwar
         entries = []
         for key, rows in cubes(xyz, center, half):
             begin = file.tell()
-            writer.write_points(record[rows])
+            part: Any = record[rows]  # the same kind of record
+            writer.write_points(part)
             packer.compressor.finish_current_chunk()
             entries.append(struct.pack("<4iQ2i", *key, begin, file.tell() - begin, len(rows)))
         hierarchy = laspy.VLR("copc", 1000, "EPT hierarchy", b"".join(entries))

@@ -34,7 +34,8 @@ def _label(plan: Plan, whole: Whole, line: Line, tile: int) -> dict[str, np.ndar
         fits = LocalFits(**{name: found[name] for name in LocalFits.__dataclass_fields__})
     labels, options = Labels(len(key)), plan.options
     crease, outline = (
-        _strengths(plan, tile, kind, *of_kind) for kind, *of_kind in zip(KINDS, probabilities, line.even, strict=True)
+        _strengths(plan, tile, kind, probability, even)
+        for kind, probability, even in zip(KINDS, probabilities, line.even, strict=True)
     )
     everyone = np.arange(len(key))
     labels.add(everyone, EdgeKind.CREASE, crease)

@@ -166,7 +166,7 @@ class Spool:
 
     def _touched(self, box: Box) -> list[Part]:
         """Return the parts that may have points in a box."""
-        return [self.parts[i] for i in np.flatnonzero(box.touches(*self._corners) & self._filled)]
+        return [self.parts[i] for i in np.flatnonzero(box.touches(*self._corners) & self._filled).tolist()]
 
     @cached_property
     def _corners(self) -> tuple[np.ndarray, np.ndarray]:
