@@ -17,8 +17,9 @@ import edgel
 from edgel import synth, tiled
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.scan_lines import scan_line_stretch
-from edgel.tiled import aside, classify, engine, passes
+from edgel.tiled import aside, classify, disk, engine, passes
 from edgel.tiled.plan import Plan
+from edgel.tiled.spool import BYTES_A_POINT
 
 FIELDS = ("kind", "strength", "position", "position_std", "scale", "direction", "normals", "angle", "convex")
 
@@ -47,6 +48,12 @@ def test_any_tiling_gives_the_answer_of_the_whole(files, strip, whole, tmp_path,
     assert {*np.unique(whole.kind)} >= {edgel.EdgeKind.CREASE, edgel.EdgeKind.OCCLUDING, edgel.EdgeKind.OCCLUDED}
     for number, (file, output) in enumerate(zip(files, found.outputs, strict=True)):
         assert edgel.read(output).xyz.tobytes() == np.load(file)[found.edges(number).index].tobytes()
+
+
+def test_tiles_in_any_order_give_the_same(files, whole, tmp_path, monkeypatch):
+    here = engine._here
+    monkeypatch.setattr(engine, "_here", lambda task, jobs: here(task, dict(reversed(jobs.items()))))
+    check_same(tiled.detect(files, tmp_path / "out", tile_points=3_500), whole, lengths_of(files))
 
 
 def test_a_sensor_tells_the_outside_in_tiles_too(files, strip, tmp_path):
@@ -229,7 +236,7 @@ def test_a_disk_that_is_too_small_is_told_before(files, tmp_path, monkeypatch):
 
 
 def test_a_disk_that_fills_up_is_told_by_what_the_first_tiles_took(files, whole, tmp_path, monkeypatch):
-    usage, took = namedtuple("usage", "total used free"), sum(os.path.getsize(file) for file in files) * 57 // 24
+    usage, took = namedtuple("usage", "total used free"), (BYTES_A_POINT + disk.RESULTS) * sum(lengths_of(files))
     monkeypatch.setattr("shutil.disk_usage", lambda path: usage(10**12, 0, int(took * 1.01)))
     with pytest.raises(OSError, match="go on with the same call"):
         tiled.detect(files, tmp_path / "out", tile_points=3_500)

@@ -128,20 +128,31 @@ def _joined(known: Known, kind: str, even: float) -> dict[str, np.ndarray]:
 def merge_chains(plan: Plan) -> None:
     """Join the chains of all tiles across their seams, and tell each tile which of its faint points hold on to one."""
     for kind in KINDS:
-        found = []
-        for tile in range(len(plan.tiles)):
-            with plan.load("link", tile) as stored:
-                found.append({name: stored[f"{kind}_{name}"] for name in ("row", "chain", "strong", "across")})
-        first = np.concatenate([[0], np.cumsum([len(part["strong"]) for part in found])]).astype(np.int64)
-        pairs = [np.zeros((2, 0), np.int64)]
-        for tile, part in enumerate(found):
-            for other in np.unique(part["across"][:, 1]):
-                own, _, row = part["across"][part["across"][:, 1] == other].T
-                theirs = found[other]["chain"][np.searchsorted(found[other]["row"], row)]
-                pairs.append(np.stack([first[tile] + own, first[other] + theirs]))
+        found = [_strong_of(plan, kind, tile) for tile in range(len(plan.tiles))]
+        first = np.concatenate([[0], np.cumsum([len(strong) for strong in found])]).astype(np.int64)
+        pairs = [np.zeros((2, 0), np.int64), *(_pairs(plan, kind, tile, first) for tile in range(len(plan.tiles)))]
         root = join(int(first[-1]), *np.concatenate(pairs, axis=1))
         strong = np.zeros(root.max(initial=-1) + 1, bool)
-        np.logical_or.at(strong, root, np.concatenate([np.zeros(0, bool), *(part["strong"] for part in found)]))
-        for tile, part in enumerate(found):
-            kept = strong[root[first[tile] + part["chain"]]]
+        np.logical_or.at(strong, root, np.concatenate([np.zeros(0, bool), *found]))
+        for tile in range(len(plan.tiles)):
+            with plan.load("link", tile) as stored:
+                kept = strong[root[first[tile] + stored[f"{kind}_chain"]]]
             plan.keep(f"chained {kind}", tile, lambda kept=kept: {"kept": kept})
+
+
+def _strong_of(plan: Plan, kind: str, tile: int) -> np.ndarray:
+    with plan.load("link", tile) as stored:
+        return stored[f"{kind}_strong"]
+
+
+def _pairs(plan: Plan, kind: str, tile: int, first: np.ndarray) -> np.ndarray:
+    """Return the pairs (2, K) of chains that a tile's points link across its seams, by their numbers among all."""
+    with plan.load("link", tile) as stored:
+        across = stored[f"{kind}_across"]
+    pairs = [np.zeros((2, 0), np.int64)]
+    for other in np.unique(across[:, 1]):
+        own, _, row = across[across[:, 1] == other].T
+        with plan.load("link", other) as stored:
+            theirs = stored[f"{kind}_chain"][np.searchsorted(stored[f"{kind}_row"], row)]
+        pairs.append(np.unique(np.stack([first[tile] + own, first[other] + theirs]), axis=1))
+    return np.concatenate(pairs, axis=1)

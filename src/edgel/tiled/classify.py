@@ -13,9 +13,11 @@ from edgel._neighbors.scan_lines import stretch_along_lines
 from edgel._range_image import pixel_size, raster, sides_in
 from edgel._surface import classify, screen
 from edgel._surface.classify import Classification
+from edgel._surface.curved_faces import EDGE
 from edgel._surface.faces import LocalFits, fit_locally
 from edgel._surface.line import NEAREST, histogram, least_probability
 from edgel._surface.reach import Bounds, settled, with_context_of
+from edgel._surface.rims import OUTWARD
 from edgel._surface.two_planes import FITS
 from edgel.edges import EdgeKind
 from edgel.tiled.box import Box
@@ -24,6 +26,7 @@ from edgel.tiled.plan import Plan
 
 HALO = 64.0
 """Spacings around a tile, at first: most points hear of what lies within 60."""
+FITS_KEPT = [name for name in LocalFits.__dataclass_fields__ if name != "seen"]  # nothing is smoothed in tiles
 _GROUP = 256.0  # spacings: points not yet sure that lie within such a square get a window of their own
 
 
@@ -136,15 +139,24 @@ def _fitted(plan: Plan, window: Window, kept: Classification) -> dict[str, np.nd
         found = knn(index, at_points(index, kept.points), count)
         nearest[:, :count], farthest = window.keys[found.points], found.distances[:, -1]
     own = {"key": window.keys[kept.points], "crease": kept.crease, "outline": kept.outline}
-    return {**own, "nearest": nearest, "farthest": farthest, **vars(fits)}
+    return {**own, "nearest": nearest, "farthest": farthest, **{name: getattr(fits, name) for name in FITS_KEPT}}
 
 
 def empty() -> dict[str, np.ndarray]:
     """Return what is kept of a tile without points."""
-    none, vectors = np.zeros(0), np.zeros((0, 3))
-    fits = LocalFits(vectors, vectors, vectors, none, none, np.zeros((0, 5)), np.zeros((0, 13)), none, none)
-    own = {"key": np.zeros(0, np.int64), "crease": none, "outline": none}
-    return {**own, "nearest": np.zeros((0, NEAREST), np.int64), "farthest": none, **vars(fits), "side": none}
+    shapes = {
+        "crease": (),
+        "outline": (),
+        "farthest": (),
+        "side": (),
+        "offset": (),
+        "noise": (),
+        "disc": (),
+        "reach": (),
+    }
+    shapes |= {"xyz": (3,), "normals": (3,), "outward": (OUTWARD,), "refined": (EDGE,)}
+    none = {name: np.zeros((0, *shape)) for name, shape in shapes.items()}
+    return {**none, "key": np.zeros(0, np.int64), "nearest": np.zeros((0, NEAREST), np.int64)}
 
 
 def _groups(xyz: np.ndarray, keys: np.ndarray, halo: float, spacing: float) -> list[tuple[Box, float, np.ndarray]]:

@@ -12,8 +12,8 @@ from edgel.tiled.plan import Plan
 from edgel.tiled.spool import BYTES_A_POINT
 
 _EXPANDS = 8  # bytes of points in the spool for one of a file that does not say how many it has, at most
-_RESULTS = 25  # bytes a point that results take at least: measured on a city, of which one point in twenty is an edge's
-_LABELS = 0.7  # bytes of edge points with their places, over what was kept to find them: measured, 0.5 to 0.7
+RESULTS = 76  # bytes a point of results, as measured on a city of which one point in ten is an edge's
+_LABELS = 0.6  # bytes of edge points, labelled and written, over what was kept to find them: measured, 0.5 to 0.6
 
 
 def check_before(paths: Sequence[str], work: Path) -> None:
@@ -29,7 +29,7 @@ def check_before(paths: Sequence[str], work: Path) -> None:
     _check(
         work,
         sum(
-            _EXPANDS * os.path.getsize(path) if count is None else (BYTES_A_POINT + _RESULTS) * count
+            _EXPANDS * os.path.getsize(path) if count is None else (BYTES_A_POINT + RESULTS) * count
             for path, count in rows.items()
         ),
     )

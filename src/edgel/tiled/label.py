@@ -18,7 +18,7 @@ from edgel._surface.surface import SURE
 from edgel.edges import EdgeKind
 from edgel.tiled.box import Box
 from edgel.tiled.chains import KINDS, Line
-from edgel.tiled.classify import HALO
+from edgel.tiled.classify import FITS_KEPT, HALO
 from edgel.tiled.measure import Whole
 from edgel.tiled.plan import Plan
 
@@ -31,7 +31,7 @@ def label_tile(plan: Plan, whole: Whole, line: Line, tile: int) -> None:
 def _label(plan: Plan, whole: Whole, line: Line, tile: int) -> dict[str, np.ndarray]:
     with plan.load("classify", tile) as found:
         key, side, probabilities = found["key"], found["side"], [found[kind] for kind in KINDS]
-        fits = LocalFits(**{name: found[name] for name in LocalFits.__dataclass_fields__})
+        fits = LocalFits(**{name: found[name] for name in FITS_KEPT}, seen=found["xyz"])
     labels, options = Labels(len(key)), plan.options
     crease, outline = (
         _strengths(plan, tile, kind, probability, even)
