@@ -9,41 +9,55 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
+from functools import cache, partial
 from typing import Any, TypeVar
 
 from numba import njit
 
 from edgel._kernels.cache import KernelCache
+from edgel._kernels.pieces import PieceCompiler, template_of, without_collection
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
+_ANY_ORDER = {"reassoc", "nsz", "contract"}
+
+
 def _compiled(function: F, **options: Any) -> F:
-    # Division by 0 gives infinity or NaN: a branch to an exception would keep every loop that divides off SIMD.
-    compiled: Any = njit(nogil=True, error_model="numpy", **options)(function)
+    # Division by 0 gives infinity or NaN: a branch to an exception would keep every loop that divides off SIMD. Nothing
+    # calls kernels from C.
+    return njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)(function)  # pyright: ignore[reportReturnType]
+
+
+def kernel(function: F, **options: Any) -> F:
+    """Compile a function that Python calls to machine code, without the GIL, kept on disk between runs."""
+    compiled: Any = _compiled(function, **options)
     if compiled is not function:  # as it is under NUMBA_DISABLE_JIT
         compiled._cache = KernelCache(function)
+        compiled.compile = partial(without_collection, compiled.compile)
     return compiled
 
 
-def kernel(function: F) -> F:
-    """Compile a function to machine code, without the GIL, kept on disk between runs."""
-    return _compiled(function)
+def routine(function: F, **options: Any) -> F:
+    """Compile a function that only kernels call, as a piece of each of them; Python cannot call it."""
+    compiled: Any = _compiled(function, no_cpython_wrapper=True, pipeline_class=PieceCompiler, **options)
+    if compiled is not function:
+        compiled.get_call_template = partial(template_of, compiled.get_call_template)
+    return compiled
 
 
-def summing_kernel(function: F) -> F:
-    """Compile like `kernel`, and let sums be taken in any order, so that loops over neighbours run on SIMD.
+def summing_routine(function: F) -> F:
+    """Compile like `routine`, and let sums be taken in any order, so that loops over neighbours run on SIMD.
 
     The order depends on the loop alone, so results stay the same for any number of threads; NaN and infinity keep their
     meaning. The moments of 32 neighbours take a quarter of the time so.
     """
-    return _compiled(function, fastmath={"reassoc", "nsz", "contract"})
+    return routine(function, fastmath=_ANY_ORDER)
 
 
 def part(function: F) -> F:
-    """Compile a part of kernels, which is inlined (an array passed costs seven words); Python cannot call it."""
-    return _compiled(function, forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    """Compile like `routine`, and inline it wherever it is called: an array passed costs seven words."""
+    return routine(function, forceinline=True)
 
 
 def num_threads() -> int:
