@@ -16,7 +16,7 @@ FLOORS = [
     {"cloud", "_objects", "_intrinsics", "_depth", "_columns", "_kernels", "_stages"},
     {"edges", "_kinds", "_faces", "_neighbors", "io"},
     {"_scale", "_surface", "_range_image", "_color", "paper", "plot", "synth", "metrics"},
-    {"_labels", "_sides", "_detect", "export"},
+    {"_labels", "_sides", "_detect", "_many", "_probabilities", "export"},
     {"curves", "tiled"},
     {"_report"},
     {"_demo", "_viewer"},

@@ -7,7 +7,8 @@ of threads. A pool of our own is safe when called from several threads, where Nu
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache, partial
 from typing import Any, TypeVar
@@ -16,6 +17,7 @@ from numba import njit
 
 from edgel._kernels.cache import KernelCache
 from edgel._kernels.pieces import PieceCompiler, template_of, without_collection
+from edgel._kernels.threads import num_threads
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -60,20 +62,6 @@ def part(function: F) -> F:
     return routine(function, forceinline=True)
 
 
-def num_threads() -> int:
-    """Return how many threads kernels use: ``EDGEL_NUM_THREADS``, or the cores this process may run on."""
-    asked = os.environ.get("EDGEL_NUM_THREADS", "")
-    if asked and (not asked.isdigit() or int(asked) == 0):
-        raise ValueError(f"EDGEL_NUM_THREADS={asked!r}: expected a whole number above 0")
-    return (
-        int(asked)
-        if asked
-        else len(os.sched_getaffinity(0))
-        if hasattr(os, "sched_getaffinity")
-        else os.cpu_count() or 1
-    )
-
-
 @cache
 def _pool(threads: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(threads, thread_name_prefix="edgel")
@@ -82,6 +70,9 @@ def _pool(threads: int) -> ThreadPoolExecutor:
 # A forked child inherits the pool without its threads, and would wait for them for ever: it makes its own.
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_pool.cache_clear)
+
+
+_thread = threading.local()
 
 
 def run_slices(compiled: Callable[..., Any], count: int, *arguments: Any, size: int = 8192) -> None:
@@ -99,7 +90,7 @@ def run_slices(compiled: Callable[..., Any], count: int, *arguments: Any, size: 
     starts = range(0, count, size)
     if not starts:
         return
-    threads = min(num_threads(), len(starts))
+    threads = 1 if getattr(_thread, "is_busy", False) else min(num_threads(), len(starts))
     if threads == 1:
         for start in starts:
             compiled(start, min(start + size, count), *arguments)
@@ -122,3 +113,33 @@ def run_slices(compiled: Callable[..., Any], count: int, *arguments: Any, size: 
         for _ in left:
             pass
         raise
+
+
+def run_each(work: Callable[[Any], None], things: Iterable[Any]) -> None:
+    """Call ``work(thing)`` for each thing, in parallel; the kernels that it runs stay on its thread.
+
+    Things are taken one at a time, as threads are done with those before.
+    """
+    left, over = iter(things), object()
+    lock, stopped = threading.Lock(), threading.Event()
+
+    def take() -> Any:
+        with lock:  # a generator cannot be entered by two
+            return over if stopped.is_set() else next(left, over)
+
+    def keep_on() -> None:
+        _thread.is_busy = True  # with a pool that waits for itself it would wait for ever
+        try:
+            while (thing := take()) is not over:
+                work(thing)
+        except BaseException:  # Ctrl-C too: what has not begun need not run any more
+            stopped.set()
+            raise
+        finally:
+            _thread.is_busy = False
+
+    threads = num_threads()
+    jobs = [_pool(threads - 1).submit(keep_on) for _ in range(threads - 1)]
+    keep_on()
+    for job in jobs:
+        job.result()
