@@ -18,8 +18,12 @@ from numba.core.compiler import Compiler
 class PieceLibrary(JITCodeLibrary):
     """Code that is linked into other libraries, and never runs by itself."""
 
-    def _optimize_final_module(self) -> None:
+    def _optimize_functions(self, ll_module: Any) -> None:
         """Leave that to the kernel."""
+        ll_module.data_layout = self._codegen._data_layout
+
+    def _optimize_final_module(self) -> None:
+        """Leave that to the kernel, too."""
 
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()
