@@ -124,9 +124,8 @@ def test_files_and_functions_stay_small(module):
 
 
 def is_kernel(node: ast.FunctionDef) -> bool:
-    return any(
-        isinstance(name, ast.Name) and name.id in ("kernel", "summing_kernel", "part") for name in node.decorator_list
-    )
+    kinds = ("kernel", "routine", "summing_routine", "part")
+    return any(isinstance(name, ast.Name) and name.id in kinds for name in node.decorator_list)
 
 
 def takes_options(module: str, node: ast.FunctionDef) -> bool:

@@ -18,12 +18,17 @@ from numba.core.compiler import Compiler
 class PieceLibrary(JITCodeLibrary):
     """Code that is linked into other libraries, and never runs by itself."""
 
+    sums = False  # in any order: it is chosen here, once, or it would hang on the kernel that the sum is linked into
+
     def _optimize_functions(self, ll_module: Any) -> None:
-        """Leave that to the kernel."""
-        ll_module.data_layout = self._codegen._data_layout
+        if self.sums:
+            super()._optimize_functions(ll_module)
+        else:  # the kernel's task
+            ll_module.data_layout = self._codegen._data_layout
 
     def _optimize_final_module(self) -> None:
-        """Leave that to the kernel, too."""
+        if self.sums:
+            super()._optimize_final_module()
 
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()
@@ -49,6 +54,7 @@ class PieceCompiler(Compiler):
         """Choose the library before anything is compiled into it."""
         state = self.state
         state.library = PieceLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.sums = bool(state.flags.fastmath)
         return super().define_pipelines()
 
 
