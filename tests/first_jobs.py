@@ -47,10 +47,10 @@ def needed(job: str) -> dict[str, str]:
     loaded: list[tuple[str, str]] = []
     read = KernelCache.load_overload
 
-    def load_overload(self: KernelCache, sig: Any, context: Any) -> Any:
+    def load_overload(self: KernelCache, sig: Any, target_context: Any) -> Any:
         function = self._function
         loaded.append((f"{function.__module__}:{function.__qualname__}", ahead.words_of(sig)))
-        return read(self, sig, context)
+        return read(self, sig, target_context)
 
     KernelCache.load_overload = load_overload
     edgel.detect(JOBS[job]())

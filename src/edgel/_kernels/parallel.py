@@ -28,7 +28,8 @@ _ANY_ORDER = {"reassoc", "nsz", "contract"}
 def _compiled(function: F, **options: Any) -> F:
     # Division by 0 gives infinity or NaN: a branch to an exception would keep every loop that divides off SIMD. Nothing
     # calls kernels from C.
-    return njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)(function)  # pyright: ignore[reportReturnType]
+    chosen: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, **options}
+    return njit(**chosen)(function)
 
 
 def kernel(function: F, **options: Any) -> F:
