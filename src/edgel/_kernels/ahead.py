@@ -33,6 +33,8 @@ _lock = threading.Lock()
 _begun: dict[str, threading.Event | None] = {}
 """Kernels that are compiled, with what says that another process is done with it; None where it is this process."""
 _started: set[str] = set()
+if hasattr(os, "register_at_fork"):  # in a forked child nobody would say that they are done
+    os.register_at_fork(after_in_child=_begun.clear)
 
 
 @cache
