@@ -90,18 +90,9 @@ def fit_curved_faces(first, places, squared, queries, targets, xyz, fits, max_aw
 @routine
 def make_scratch():
     """Make the scratch buffers of a fit: faces, frames, sums, neighbours, and those of the normal equations."""
-    square = (_TERMS, _TERMS)
-    return (
-        np.empty((2, _TERMS)),
-        np.empty((2, 3)),
-        np.empty((2, _SUMS)),
-        np.empty((7, COUNTS[-1])),
-        np.empty(square),
-        np.empty(square),
-        np.empty(square),
-        np.empty(_TERMS),
-        np.empty(_TERMS),
-    )
+    square, matrices = (_TERMS, _TERMS), (np.empty((2, _TERMS)), np.empty((2, 3)), np.empty((2, _SUMS)))
+    normal = (np.empty(square), np.empty(square), np.empty(square), np.empty(_TERMS), np.empty(_TERMS))
+    return matrices + (np.empty((7, COUNTS[-1])),) + normal
 
 
 @routine
