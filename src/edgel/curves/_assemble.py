@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from edgel.curves import _fit, _rims
+from edgel.curves import _fit
 from edgel.curves._circle import RADIUS
 from edgel.curves._corners import Nodes, meet
 from edgel.curves._curves import CurveKind, Curves
@@ -110,7 +110,7 @@ def _held(
     rho = np.hypot(x, y)
     miss = np.stack([rho - shape[:, RADIUS], z], axis=1)
     # How both change with tilt, centre, radius and height.
-    change = np.zeros((len(shape), 2, _rims.UNKNOWNS))
+    change = np.zeros((len(shape), 2, _fit.UNKNOWNS))
     u, v = x / rho, y / rho
     change[:, 0, 0], change[:, 0, 1] = u * z, v * z
     change[:, 0, 2], change[:, 0, 3], change[:, 0, 4] = u, v, 1.0

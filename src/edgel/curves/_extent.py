@@ -42,7 +42,6 @@ class Extents:
 
 def extents(
     measured: Measured,
-    xyz: np.ndarray,
     owned: tuple[np.ndarray, np.ndarray],
     position: np.ndarray,
     ranges: np.ndarray,
@@ -59,7 +58,7 @@ def extents(
     ends, closed = np.zeros((count, _MOST, 2)), np.zeros((count, _MOST), np.bool_)
     found, number = np.zeros((count, _MOST), np.int64), np.zeros(count, np.int64)
     beside = measured.beside
-    arguments = (shapes, measured.fit, beside.points, beside.start, xyz, *owned, position, spacing, low, high, whole)
+    arguments = (shapes, measured.fit, beside.xyz, beside.start, *owned, position, spacing, low, high, whole)
     run_slices(_extents, count, *arguments, ends, closed, found, number, size=16)
     kept = np.arange(_MOST) < number[:, None]
     return Extents(np.repeat(np.arange(count), number), ends[kept], closed[kept], found[kept])
@@ -67,7 +66,7 @@ def extents(
 
 @kernel
 def _extents(
-    start, stop, shapes, fits, beside, begin, xyz, rows, first, position, spacing, low, high, whole,
+    start, stop, shapes, fits, beside, begin, rows, first, position, spacing, low, high, whole,
     ends, closed, found, number,
 ):  # fmt: skip
     for k in range(start, stop):
@@ -83,7 +82,7 @@ def _extents(
             if 0 <= b < bins:
                 edges[b] += 1
         if fits[k, _fit.STATE] == _fit.MEASURED:
-            _count_sides(shapes[k], fits[k], beside[begin[k] : begin[k + 1]], xyz, h, low[k], width, around, sides)
+            _count_sides(shapes[k], fits[k], beside[begin[k] : begin[k + 1]], h, low[k], width, around, sides)
         speaks = (edges > 0) | ((sides[:, 0] > 0) & (sides[:, 1] > 0))
         _intervals(speaks, edges, h, low[k], width, whole[k], k, ends, closed, found, number)
 
@@ -96,10 +95,10 @@ def _bin(along, low, width, around):
 
 
 @kernel
-def _count_sides(shape, fit, beside, xyz, h, low, width, around, sides):
+def _count_sides(shape, fit, beside, h, low, width, around, sides):
     """Count the points of either face in each bin along a shape, near the edge."""
-    for i in beside:
-        a, b, along = in_profile(shape, xyz[i, 0], xyz[i, 1], xyz[i, 2])
+    for i in range(len(beside)):
+        a, b, along = in_profile(shape, beside[i, 0], beside[i, 1], beside[i, 2])
         bin_ = _bin(along, low, width, around)
         if not 0 <= bin_ < len(sides):
             continue

@@ -2,57 +2,60 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from edgel._kernels.parallel import kernel, run_slices
-from edgel._neighbors.kdtree import NeighborIndex
-from edgel._neighbors.knn import knn
+from edgel._neighbors.kdtree import NeighborIndex, node_start
 from edgel.curves._circle import RADIUS, along_of, offset_of
 
 REACH = 4.5
 """Spacings: so far from a curve its faces are measured."""
 BEYOND = 4.0
 """Spacings: so far past its ends is looked whether a curve goes on."""
-_STEP = 1.5  # spacings between the stations where neighbours are asked for
-_AROUND = 64  # points around each: all within REACH
+_ROOM = 512  # points beside a curve, on average, that there is room for to begin with
+_SLICE = 32
 
 
 @dataclass(frozen=True, eq=False)
 class Beside:
-    """Points of the cloud beside each curve, each once.
+    """Points of the cloud beside each curve.
 
     Attributes
     ----------
-    points : (G,) int64
-        Points of the index.
+    xyz : (G, 3) float64
+        In the order of the tree, curve after curve.
     start : (K + 1,) int64
     """
 
-    points: np.ndarray
+    xyz: np.ndarray
     start: np.ndarray
 
 
-def gather(
-    index: NeighborIndex, xyz: np.ndarray, shapes: np.ndarray, ranges: np.ndarray, spacing: np.ndarray
-) -> Beside:
-    """Find the points (N, 3) of an index that are beside shapes (K, 13), over ranges (K, 2) along them."""
+def gather(index: NeighborIndex, shapes: np.ndarray, ranges: np.ndarray, spacing: np.ndarray) -> Beside:
+    """Find the points of an index that are beside shapes (K, 13), over ranges (K, 2) along them."""
     count = len(shapes)
-    low, high, _ = widened(shapes, ranges, spacing)
-    number = np.maximum(np.ceil((high - low) / (_STEP * spacing)).astype(np.int64), 1)
-    start = np.concatenate([[0], np.cumsum(number)])
-    owner = np.repeat(np.arange(count), number)
-    step = ((high - low) / number)[owner]
-    along = low[owner] + (np.arange(start[-1]) - start[owner] + 0.5) * step
-    places = on_shapes(shapes[owner], along)
-    if not len(places):
-        return Beside(np.empty(0, np.int64), np.zeros(1, np.int64))
-    near = knn(index, places, min(_AROUND, len(index))).points
-    kept = np.zeros(near.shape, np.bool_)
-    run_slices(_keep, len(places), near, xyz, shapes, spacing, owner, along, step, kept, size=1024)
-    counts = np.bincount(owner, kept.sum(axis=1), minlength=count).astype(np.int64)
-    return Beside(near[kept], np.concatenate([[0], np.cumsum(counts)]))
+    low, high, whole = widened(shapes, ranges, spacing)
+    middle, half = on_shapes(shapes, 0.5 * (low + high)), 0.5 * (high - low)
+    half = np.where(whole, 2 * shapes[:, RADIUS], half)
+    counts = np.zeros(count, np.int64)
+    found: dict[int, np.ndarray] = {}
+
+    def work(start: int, stop: int) -> None:
+        room = _ROOM * _SLICE
+        while start not in found:
+            xyz = np.empty((room, 3))
+            arguments = (index.xyz, index.boxes, shapes, middle, half, low, high, spacing, counts, xyz)
+            number = _gather(start, stop, *arguments)
+            if number <= room:
+                found[start] = xyz[:number]
+            room = number
+
+    run_slices(work, count, size=_SLICE)
+    parts = [found[start] for start in range(0, count, _SLICE)]
+    return Beside(np.concatenate(parts or [np.empty((0, 3))]), np.concatenate([[0], np.cumsum(counts)]))
 
 
 def widened(shapes: np.ndarray, ranges: np.ndarray, spacing: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -74,15 +77,45 @@ def on_shapes(shapes: np.ndarray, along: np.ndarray) -> np.ndarray:
 
 
 @kernel
-def _keep(start, stop, near, xyz, shapes, spacing, owner, along, step, kept):
-    """Mark the neighbours of each station that are beside it, and not beside the next one."""
-    for q in range(start, stop):
-        shape, h = shapes[owner[q]], spacing[owner[q]]
-        around = 2.0 * np.pi * shape[RADIUS]
-        for k in range(near.shape[1]):
-            i = near[q, k]
-            ahead = along_of(shape, xyz[i, 0], xyz[i, 1], xyz[i, 2]) - along[q]
-            if around > 0.0:
-                ahead -= around * np.floor(ahead / around + 0.5)
-            inside = -0.5 * step[q] <= ahead < 0.5 * step[q]
-            kept[q, k] = inside and offset_of(shape, xyz[i, 0], xyz[i, 1], xyz[i, 2]) < REACH * h
+def _gather(start, stop, places, boxes, shapes, middle, half, low, high, spacing, counts, xyz):
+    """Write the points beside some shapes as far as there is room, and return how many there are.
+
+    The distance from a shape changes by no more than the way that one goes, so what is farther from it than its radius
+    and the reach, as the balls around the nodes of the tree are, holds no point beside it.
+    """
+    stack = np.empty(128, np.int64)
+    leaves, total, number = len(boxes) // 2, places.shape[1], 0
+    for k in range(start, stop):
+        shape, reach, begin = shapes[k], REACH * spacing[k], number
+        around, depth = 2.0 * math.pi * shape[RADIUS], 1
+        stack[0] = 1
+        while depth > 0:
+            depth -= 1
+            node = stack[depth]
+            x, y = 0.5 * (boxes[node, 0] + boxes[node, 3]), 0.5 * (boxes[node, 1] + boxes[node, 4])
+            z = 0.5 * (boxes[node, 2] + boxes[node, 5])
+            ball = 0.5 * math.sqrt(
+                (boxes[node, 3] - boxes[node, 0]) ** 2
+                + (boxes[node, 4] - boxes[node, 1]) ** 2
+                + (boxes[node, 5] - boxes[node, 2]) ** 2
+            )
+            away = math.sqrt((x - middle[k, 0]) ** 2 + (y - middle[k, 1]) ** 2 + (z - middle[k, 2]) ** 2)
+            if away > half[k] + reach + ball or offset_of(shape, x, y, z) > reach + ball:
+                continue
+            if node < leaves:
+                stack[depth], stack[depth + 1] = 2 * node + 1, 2 * node
+                depth += 2
+                continue
+            for p in range(node_start(node - leaves, total, leaves), node_start(node - leaves + 1, total, leaves)):
+                x, y, z = places[0, p], places[1, p], places[2, p]
+                if offset_of(shape, x, y, z) >= reach:
+                    continue
+                along = along_of(shape, x, y, z)
+                if around > 0.0:
+                    along -= around * math.floor((along - low[k]) / around)
+                if low[k] <= along <= high[k]:
+                    if number < len(xyz):
+                        xyz[number, 0], xyz[number, 1], xyz[number, 2] = x, y, z
+                    number += 1
+        counts[k] = number - begin
+    return number

@@ -8,13 +8,12 @@ import numpy as np
 
 from edgel._kernels.parallel import kernel, run_slices
 from edgel._neighbors.kdtree import NeighborIndex
-from edgel.curves import _fit, _rims
+from edgel.curves import _fit
 from edgel.curves._circle import RADIUS, fit_line
+from edgel.curves._faces import fit_faces
 from edgel.curves._gather import REACH, Beside, gather
-from edgel.curves._lines import fit_line_faces
 from edgel.curves._points import EdgePoints
 from edgel.curves._ranges import ranges_of
-from edgel.curves._rims import fit_rim_faces
 from edgel.edges import EdgeKind
 
 _SHORT, _SHORTEST = 2.4, 1.5  # spacings: of faces too small for REACH
@@ -36,10 +35,10 @@ class Measured:
     Attributes
     ----------
     shape : (K, 13) float64
-    fit : (K, 23) float64
+    fit : (K, 22) float64
         See `_fit`.
     covariance : (K, 10, 10) float64
-        Of circles, see `_rims`.
+        Of the unknowns of `_fit`.
     ranges : (K, 2) float64
         From where to where along each its edge points lie.
     holds : (K,) bool
@@ -58,7 +57,6 @@ class Measured:
 
 def measure(
     index: NeighborIndex,
-    xyz: np.ndarray,
     shapes: np.ndarray,
     rows: tuple[np.ndarray, np.ndarray],
     points: EdgePoints,
@@ -72,9 +70,9 @@ def measure(
     of them, since small parts have small faces, and an arc that is no arc as a line.
     """
     ranges = ranges_of(shapes, rows, position)
-    beside = gather(index, xyz, shapes, ranges, spacing)
+    beside = gather(index, shapes, ranges, spacing)
     outline = _outlines(points, rows)
-    best = _attempt(shapes, np.arange(len(shapes)), REACH, beside, xyz, rows, points, position, spacing, ranges)
+    best = _attempt(shapes, np.arange(len(shapes)), REACH, beside, rows, points, spacing, ranges)
     noise = _noise_of(best, spacing)
     good = _holds(best, noise, spacing, outline)
     lines = np.zeros_like(shapes)
@@ -86,7 +84,7 @@ def measure(
             continue
         begin = lines if straight else shapes
         along = ranges_of(begin, rows, position) if straight else ranges
-        other = _attempt(begin, which, reach, beside, xyz, rows, points, position, spacing, along)
+        other = _attempt(begin, which, reach, beside, rows, points, spacing, along)
         holds = _holds(other, noise, spacing[which], outline[which])
         better = holds & (
             ~good[which] | (straight & (_rough(other) < 1.15 * _rough(best)[which] + 0.02 * spacing[which]))
@@ -110,19 +108,17 @@ def _attempt(
     which: np.ndarray,
     reach: float,
     beside: Beside,
-    xyz: np.ndarray,
     rows: tuple[np.ndarray, np.ndarray],
     points: EdgePoints,
-    position: np.ndarray,
     spacing: np.ndarray,
     ranges: np.ndarray,
 ) -> _Attempt:
     """Fit the faces beside some shapes, as far from the edge as a reach, in spacings."""
     shape, fit = shapes[which], np.full((len(which), _fit.FIT), np.nan)
     fit[:, _fit.STATE] = _fit.NONE
-    covariance = np.zeros((len(which), _rims.UNKNOWNS, _rims.UNKNOWNS))
-    arguments = (which, reach, shape, beside.points, beside.start, xyz, *rows, points.position, points.normals)
-    run_slices(_fit_faces, len(which), *arguments, spacing, ranges, fit, covariance, size=8)
+    covariance = np.zeros((len(which), _fit.UNKNOWNS, _fit.UNKNOWNS))
+    arguments = (which, reach, shape, beside.xyz, beside.start, *rows, points.position, points.normals)
+    run_slices(fit_faces, len(which), *arguments, spacing, ranges, fit, covariance, size=8)
     return _Attempt(shape, fit, covariance, ranges[which].copy())
 
 
@@ -177,32 +173,3 @@ def mean_of(values: np.ndarray, rows: tuple[np.ndarray, np.ndarray]) -> np.ndarr
 def _as_lines(start, stop, lines, rows, first, position):
     for k in range(start, stop):
         fit_line(position, rows[first[k] : first[k + 1]], lines[k])
-
-
-@kernel
-def _fit_faces(
-    start,
-    stop,
-    which,
-    reach,
-    shape,
-    beside,
-    begin,
-    xyz,
-    rows,
-    first,
-    position,
-    normals,
-    spacing,
-    ranges,
-    fit,
-    covariance,
-):
-    for q in range(start, stop):
-        k = which[q]
-        near, own = beside[begin[k] : begin[k + 1]], rows[first[k] : first[k + 1]]
-        h, low, high = spacing[k], ranges[k, 0], ranges[k, 1]
-        if shape[q, RADIUS] == 0.0:
-            fit_line_faces(shape[q], near, xyz, own, position, normals, h, reach, low, high, fit[q])
-        else:
-            fit_rim_faces(shape[q], near, xyz, own, position, normals, h, reach, low, high, fit[q], covariance[q])

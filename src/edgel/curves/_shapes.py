@@ -39,21 +39,21 @@ class Shapes:
     smoothed: Smoothed
 
 
-def find_shapes(xyz: np.ndarray, points: EdgePoints) -> Shapes:
-    """Find the lines and circles of edge points, measured on the points (N, 3) of the faces beside them."""
+def find_shapes(points: EdgePoints) -> Shapes:
+    """Find the lines and circles of edge points, measured on the faces beside them."""
     smoothed = smooth(points.position, points.direction, points.spacing)
     chains = link(smoothed, points.spacing, points.kind)
     pieces = split(chains, smoothed.position, points.spacing, smoothed.spread)
     paths = _paths(chains, pieces)
     spacing = mean_of(points.spacing, paths)
-    first = measure(points.index, xyz, pieces.shape, paths, points, smoothed.position, spacing)
+    first = measure(points.index, pieces.shape, paths, points, smoothed.position, spacing)
     owner = np.full(len(points), -1)
     claim(first.shape, _surest_first(first, paths), paths, smoothed, points.spacing, owner)
     alive = np.flatnonzero(np.bincount(owner[owner >= 0], minlength=len(pieces)) >= 3)
     owned = _rows_of(owner, alive, len(pieces))
     # Again, on all that each has now, and from a place that is right.
     spacing = mean_of(points.spacing, owned)
-    second = measure(points.index, xyz, first.shape[alive], owned, points, smoothed.position, spacing)
+    second = measure(points.index, first.shape[alive], owned, points, smoothed.position, spacing)
     kept = np.flatnonzero(second.holds)
     runs, closed = _left(chains, pieces, paths, np.isin(owner, alive[kept]), points)
     return Shapes(_take(second, kept), spacing[kept], take_rows(owned, kept), runs, closed, smoothed)
@@ -96,7 +96,7 @@ def take_rows(rows: tuple[np.ndarray, np.ndarray], kept: np.ndarray) -> tuple[np
 
 
 def _take(measured: Measured, kept: np.ndarray) -> Measured:
-    points, start = take_rows((measured.beside.points, measured.beside.start), kept)
+    points, start = take_rows((measured.beside.xyz, measured.beside.start), kept)
     beside = type(measured.beside)(points, start)
     names = ("shape", "fit", "covariance", "ranges", "holds")
     return replace(measured, beside=beside, **{name: getattr(measured, name)[kept] for name in names})

@@ -1,0 +1,372 @@
+"""The curve in which two faces meet, from the points of the faces: lines of planes, circles of surfaces of revolution.
+
+In the profile of a shape (the plane across a line; radius against height of a circle) planes, cylinders and cones are
+straight. All that is unknown, the direction or axis, the place, the radius, and how both faces turn and bend, is fitted
+at once to the distances of the points from the faces: robust least squares, in which the faces' points are chosen anew
+each round.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from edgel._kernels.cholesky import factorize
+from edgel._kernels.parallel import kernel
+from edgel.curves import _fit
+from edgel.curves._circle import RADIUS, local
+from edgel.curves._fit import BENT, CENTRE, HEIGHT, SIZE, TURN, UNKNOWNS
+from edgel.curves._profile import choose_sides, face_of, in_profile, mean_normals
+
+_TOLERANCES = (1.1, 0.8, 0.55)
+"""Spacings: how far points of a face may lie from it, round after round; then four deviations."""
+_ROUNDS, _BENDING, _SQUARING = 8, 4, 5
+"""Rounds, and those from which faces may bend, and after which they are squared up."""
+_FEWER = 160  # points that the first rounds look at, about
+LEAST = 8
+"""Points of a face: with fewer it is none."""
+FLOOR = 0.03
+"""Spacings: faces are no smoother than that."""
+_CUT = 1.14  # times: the spread of points within four deviations, weighed as they are here, is so much too small
+_SQUARE = 0.03  # of a face's normal: so near the axis or across it, a plane or a cylinder is meant
+_CORRELATED = 3.0  # edge points next to each other come from the same points of the cloud
+_SURELY, _STRAIGHT = 2.5, 0.004  # deviations, and 1 / spacings: a face bends that bends by more
+_CHANCE = 2.2  # deviations of an amplitude
+_FIRM = 1e-4  # weight of one point for what no point decides
+_LIMIT = 0.3  # radians: no round turns anything by more
+
+
+@kernel
+def fit_faces(
+    start, stop, which, reach, shapes, beside, begin, rows, first, position, normals, spacing, ranges, fits, covariances
+):
+    """Move shapes to where their faces meet; write what is known of them, and the covariance of all unknowns.
+
+    Takes the points beside each shape, its edge points (rows of `position` and `normals`), from where to where along it
+    they lie, and how far from the edge, in spacings, faces are looked at.
+    """
+    faces, inward, bend = np.empty((2, 2)), np.empty((2, 2)), np.empty(2)
+    spread, number = np.empty(2), np.empty(2)
+    system, right, free = np.empty((UNKNOWNS, UNKNOWNS)), np.empty(UNKNOWNS), np.empty(UNKNOWNS, np.bool_)
+    lower, inner, parts = np.zeros((UNKNOWNS, UNKNOWNS)), np.zeros((UNKNOWNS, UNKNOWNS)), np.empty((2, 8, 9))
+    terms = np.empty(8)
+    for q in range(start, stop):
+        k = which[q]
+        shape, fit, covariance, h, own = shapes[q], fits[q], covariances[q], spacing[k], rows[first[k] : first[k + 1]]
+        is_line = shape[RADIUS] == 0.0
+        near, profile, lever = _inside(
+            shape, beside[begin[k] : begin[k + 1]], ranges[k, 0], ranges[k, 1], (reach + 1.5) * h, h
+        )
+        mean_normals(shape, own, position, normals, faces)
+        choose_sides(profile, h, 0.8 * h, faces, inward)
+        for m in range(UNKNOWNS):
+            free[m] = m < BENT and not (is_line and (m == SIZE or m == HEIGHT))
+        for k in range(2):
+            bend[k], spread[k] = 0.0, 0.3 * h
+        sigma, both, fit[_fit.STATE] = 0.3 * h, False, _fit.NONE
+        for turn in range(_ROUNDS):
+            tolerance = _TOLERANCES[turn] * h if turn < len(_TOLERANCES) else min(max(4.0 * sigma, 0.15 * h), 1.2 * h)
+            if turn == _BENDING:
+                free[BENT] = free[BENT + 1] = True
+            stride = max(len(near) // _FEWER, 1) if turn < _BENDING else 1
+            _collect(shape, near, stride, h, lever, reach, tolerance, faces, inward, bend, spread, parts, terms, number)
+            _put_together(parts, system, right)
+            sigma = _spread_of(parts, number, turn, faces, spread)
+            if sigma < 0.0:
+                break
+            both = number[0] >= LEAST and number[1] >= LEAST
+            if both and abs(faces[0, 0] * faces[1, 1] - faces[0, 1] * faces[1, 0]) < 1e-3:
+                weaker = 1 if number[0] >= number[1] else 0  # the same face twice
+                faces[weaker, 0] = faces[weaker, 1] = 0.0
+                both = False
+            if not both:
+                k = 0 if number[0] >= number[1] else 1
+                free[TURN + 1 - k] = free[BENT + 1 - k] = False
+                spread[1 - k] = _collect_edge(shape, own, position, h, lever, inward[k], system, right, terms)
+            _solve(system, right, free, h, lever, lower, inner, covariance, turn == _BENDING)
+            _move(shape, faces, inward, bend, right, free, h, lever)
+            if not is_line:
+                if not shape[RADIUS] > h:
+                    break
+                lever = shape[RADIUS]
+                if turn == _SQUARING:
+                    _square_up(faces, inward, covariance, free)
+            if turn == _ROUNDS - 1:
+                fit[_fit.STATE] = _fit.MEASURED if both else _fit.EDGE_ALONE
+        if fit[_fit.STATE] != _fit.NONE:
+            _write(shape, faces, inward, bend, number, spread, covariance, fit)
+            fit[_fit.RIPPLE] = 0.0 if is_line else _ripple(shape, near, h, reach, sigma, faces, inward, bend)
+
+
+@kernel
+def _inside(shape, beside, low, high, reach, h):
+    """Return the points beside a shape that are not past its ends, their profile, and the lever of a tilt.
+
+    The origin of a line moves to its middle.
+    """
+    is_line = shape[RADIUS] == 0.0
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    around = 2.0 * math.pi * shape[RADIUS]
+    margin = math.inf if half > 0.35 * around and not is_line else half + 0.5 * h
+    if is_line:
+        for axis in range(3):
+            shape[axis] += middle * shape[9 + axis]
+        middle = 0.0
+    near, profile = np.empty((len(beside), 3)), np.empty((len(beside), 2))
+    number = 0
+    for i in range(len(beside)):
+        x, y, z = beside[i, 0], beside[i, 1], beside[i, 2]
+        p, q, along = in_profile(shape, x, y, z)
+        along -= middle
+        if not is_line:
+            along -= around * math.floor(along / around + 0.5)
+        if abs(along) <= margin and p * p + q * q <= reach * reach:
+            near[number, 0], near[number, 1], near[number, 2] = x, y, z
+            profile[number, 0], profile[number, 1] = p, q
+            number += 1
+    return near[:number], profile[:number], max(half, h) if is_line else shape[RADIUS]
+
+
+@kernel
+def _derivatives(shape, x, y, z, a, b, h, lever, terms):
+    """Write how a distance with normal (a, b) in the profile changes with tilt, place, radius and height."""
+    by_tilt = h / lever
+    if shape[RADIUS] == 0.0:
+        terms[0], terms[1], terms[2], terms[3] = -a * z * by_tilt, -b * z * by_tilt, -a * h, -b * h
+        terms[6] = terms[7] = 0.0
+        return
+    rho = math.sqrt(x * x + y * y)
+    u, v = (x / rho, y / rho) if rho > 0.0 else (1.0, 0.0)
+    terms[0], terms[1] = (b * x - a * u * z) * by_tilt, (b * y - a * v * z) * by_tilt
+    terms[2], terms[3], terms[6], terms[7] = -a * u * h, -a * v * h, -a * h, -b * h
+
+
+@kernel
+def _collect(shape, near, stride, h, lever, reach, tolerance, faces, inward, bend, spread, parts, terms, number):
+    """Add up the equations of the points of each face, by its spread, and count them.
+
+    `parts` (2, 8, 9) holds a triangle of products of tilt, place, the face's turn and bend, radius and height; in the
+    last column the right side; above the diagonal the sums of weights and of weighted squares.
+    """
+    for k in range(2):
+        number[k] = 0.0
+        for m in range(8):
+            for n in range(9):
+                parts[k, m, n] = 0.0
+    size = 6 if shape[RADIUS] == 0.0 else 8
+    for i in range(0, len(near), stride):
+        x, y, z = local(shape, near[i, 0], near[i, 1], near[i, 2])
+        p, q = (x, y) if size == 6 else (math.sqrt(x * x + y * y) - shape[RADIUS], z)
+        k, off, along = face_of(p, q, h, tolerance, reach, faces, inward, bend)
+        if k < 0:
+            continue
+        _derivatives(shape, x, y, z, faces[k, 0], faces[k, 1], h, lever, terms)
+        terms[4], terms[5] = along, -along * along / h
+        weight = (1.0 - (off / tolerance) ** 2) ** 2
+        number[k] += stride
+        parts[k, 0, 1] += weight
+        parts[k, 0, 2] += weight * off * off
+        weight /= max(spread[k], FLOOR * h) ** 2
+        for m in range(size):
+            one = weight * terms[m]
+            parts[k, m, 8] -= one * off
+            for n in range(m + 1):
+                parts[k, m, n] += one * terms[n]
+
+
+@kernel
+def _put_together(parts, system, right):
+    """Write the equations of all unknowns, both triangles."""
+    for m in range(UNKNOWNS):
+        right[m] = 0.0
+        for n in range(UNKNOWNS):
+            system[m, n] = 0.0
+    for k in range(2):
+        for m in range(8):
+            i = m if m < 4 else (TURN + k if m == 4 else (BENT + k if m == 5 else m - 2))
+            right[i] += parts[k, m, 8]
+            for n in range(m + 1):
+                j = n if n < 4 else (TURN + k if n == 4 else (BENT + k if n == 5 else n - 2))
+                system[i, j] += parts[k, m, n]
+                if m != n:
+                    system[j, i] += parts[k, m, n]
+
+
+@kernel
+def _spread_of(parts, number, turn, faces, spread):
+    """Write the spreads of points about their faces, drop faces of too few, and return the larger; -1 of none."""
+    sigma = -1.0
+    for k in range(2):
+        if number[k] < LEAST:
+            faces[k, 0] = faces[k, 1] = 0.0
+            continue
+        cut = _CUT if turn >= len(_TOLERANCES) else 1.0
+        spread[k] = cut * math.sqrt(parts[k, 0, 2] / max(parts[k, 0, 1] - 4.0, 1.0))
+        sigma = max(sigma, spread[k])
+    return sigma
+
+
+@kernel
+def _collect_edge(shape, rows, position, h, lever, across, system, right, terms):
+    """Add the equations of the edge points, along the only face, and return their spread."""
+    square = weights = 0.0
+    for i in rows:
+        p, q, _ = in_profile(shape, position[i, 0], position[i, 1], position[i, 2])
+        off = across[0] * p + across[1] * q
+        weight = 1.0 / (1.0 + (off / (0.5 * h)) ** 2)
+        square, weights = square + weight * off * off, weights + weight
+    spread = max(math.sqrt(square / max(weights - 3.0, 1.0)), 0.05 * h)
+    for i in rows:
+        x, y, z = local(shape, position[i, 0], position[i, 1], position[i, 2])
+        p, q, _ = in_profile(shape, position[i, 0], position[i, 1], position[i, 2])
+        off = across[0] * p + across[1] * q
+        _derivatives(shape, x, y, z, across[0], across[1], h, lever, terms)
+        terms[4], terms[5] = terms[6], terms[7]
+        weight = 1.0 / (1.0 + (off / (0.5 * h)) ** 2) / (_CORRELATED * spread * spread)
+        for m in range(TURN):
+            right[m] -= weight * terms[m] * off
+            for n in range(TURN):
+                system[m, n] += weight * terms[m] * terms[n]
+    return spread
+
+
+@kernel
+def _solve(system, right, free, h, lever, lower, inner, covariance, judge):
+    """Solve for the free unknowns, into `right`, and write their covariance in the cloud's unit (tilts in radians)."""
+    firm = 0.5 * _FIRM * (system[CENTRE, CENTRE] + system[CENTRE + 1, CENTRE + 1])
+    for m in range(UNKNOWNS):
+        # What no point decides stays: a step of a spacing, or a tilt or turn of a third, weighs as one deviation.
+        system[m, m] += firm + (1.0 if m < TURN else 10.0)
+    again = True
+    while again:
+        for m in range(UNKNOWNS):
+            if not free[m]:
+                for n in range(UNKNOWNS):
+                    system[m, n] = system[n, m] = 0.0
+                system[m, m], right[m] = 1.0, 0.0
+        factorize(system, lower, inner)
+        for m in range(UNKNOWNS):
+            for n in range(m + 1):
+                total = 0.0
+                for i in range(m, UNKNOWNS):
+                    total += inner[i, m] * inner[i, n]
+                covariance[m, n] = covariance[n, m] = total
+        again = False
+        for m in range(BENT, UNKNOWNS):
+            step = 0.0
+            for n in range(UNKNOWNS):
+                step += covariance[m, n] * right[n]
+            if judge and free[m] and abs(step) < max(_SURELY * math.sqrt(covariance[m, m]), _STRAIGHT):
+                free[m], again = False, True
+    for m in range(UNKNOWNS):
+        lower[0, m] = 0.0
+        for n in range(UNKNOWNS):
+            lower[0, m] += covariance[m, n] * right[n]
+    for m in range(UNKNOWNS):
+        right[m] = lower[0, m] if free[m] else 0.0
+        for n in range(UNKNOWNS):
+            if free[m] and free[n]:
+                covariance[m, n] *= _unit_of(m, h, lever) * _unit_of(n, h, lever)
+            else:
+                covariance[m, n] = 0.0
+
+
+@kernel
+def _unit_of(unknown, h, lever):
+    if unknown < CENTRE:
+        return h / lever
+    return h if unknown < TURN else (1.0 if unknown < BENT else 1.0 / h)
+
+
+@kernel
+def _turned(x, y, by):
+    """Return a vector of the profile turned by so much of another one across it, at unit length."""
+    length = math.sqrt(1.0 + by * by)
+    return (x - by * y) / length, (y + by * x) / length
+
+
+@kernel
+def _move(shape, faces, inward, bend, step, free, h, lever):
+    """Turn and shift the shape and its faces by a step of the unknowns."""
+    tx = min(max(step[0] * h / lever, -_LIMIT), _LIMIT)
+    ty = min(max(step[1] * h / lever, -_LIMIT), _LIMIT)
+    for axis in range(3):
+        shape[axis] += h * (
+            step[CENTRE] * shape[3 + axis] + step[CENTRE + 1] * shape[6 + axis] + step[HEIGHT] * shape[9 + axis]
+        )
+    shape[RADIUS] += step[SIZE] * h
+    u, v, w = shape[3:6], shape[6:9], shape[9:12]
+    length, inside = math.sqrt(1.0 + tx * tx + ty * ty), 0.0
+    for axis in range(3):
+        w[axis] = (w[axis] + tx * u[axis] + ty * v[axis]) / length
+        inside += w[axis] * u[axis]
+    length = math.sqrt(1.0 - inside * inside)
+    for axis in range(3):
+        u[axis] = (u[axis] - inside * w[axis]) / length
+    v[0], v[1], v[2] = w[1] * u[2] - w[2] * u[1], w[2] * u[0] - w[0] * u[2], w[0] * u[1] - w[1] * u[0]
+    for k in range(2):
+        bend[k] = bend[k] + step[BENT + k] / h if free[BENT + k] else 0.0
+        # Faces turn about the edge: towards where they go.
+        side = 1.0 if inward[k, 1] * faces[k, 0] - inward[k, 0] * faces[k, 1] >= 0.0 else -1.0
+        by = side * min(max(step[TURN + k], -_LIMIT), _LIMIT)
+        faces[k, 0], faces[k, 1] = _turned(faces[k, 0], faces[k, 1], by)
+        inward[k, 0], inward[k, 1] = -side * faces[k, 1], side * faces[k, 0]
+
+
+@kernel
+def _square_up(faces, inward, covariance, free):
+    """Where a face is a plane across the axis, or a cylinder, but for its uncertainty, it is that."""
+    for k in range(2):
+        if not free[TURN + k] or free[BENT + k] or (faces[k, 0] == 0.0 and faces[k, 1] == 0.0):
+            continue
+        unsure = min(max(3.0 * math.sqrt(covariance[TURN + k, TURN + k]), _SQUARE), 0.12)
+        for axis in range(2):
+            if abs(faces[k, axis]) < unsure:
+                other = 1 - axis
+                faces[k, axis], faces[k, other] = 0.0, 1.0 if faces[k, other] > 0.0 else -1.0
+                inward[k, other], inward[k, axis] = 0.0, 1.0 if inward[k, axis] > 0.0 else -1.0
+                free[TURN + k] = False
+
+
+@kernel
+def _ripple(shape, near, h, reach, sigma, faces, inward, bend):
+    """Return by how much more than chance a wall goes in and out three to six times on the way round."""
+    wall = 0 if abs(faces[0, 0]) >= abs(faces[1, 0]) else 1
+    tolerance = min(max(4.0 * sigma, 0.15 * h), 1.2 * h) + 0.3 * h
+    most, count, square = 0.0, 0, 0.0
+    for m in range(3, 7):
+        along, across, count, square = 0.0, 0.0, 0, 0.0
+        for i in range(len(near)):
+            p, q, turn = in_profile(shape, near[i, 0], near[i, 1], near[i, 2])
+            k, off, _ = face_of(p, q, h, tolerance, reach, faces, inward, bend)
+            if k != wall:
+                continue
+            count += 1
+            square += off * off
+            turn *= m / shape[RADIUS]
+            along, across = along + off * math.cos(turn), across + off * math.sin(turn)
+        if count == 0:
+            return 0.0
+        most = max(most, 2.0 * math.sqrt(along * along + across * across) / count)
+    return max(most - _CHANCE * math.sqrt(2.0 * square) / count, 0.0)
+
+
+@kernel
+def _write(shape, faces, inward, bend, number, spread, covariance, fit):
+    for k in range(2):
+        # Where there is one face alone, the other distance is that along it.
+        none = faces[k, 0] == 0.0 and faces[k, 1] == 0.0
+        a, b = (inward[1 - k, 0], inward[1 - k, 1]) if none else (faces[k, 0], faces[k, 1])
+        square = a * a * covariance[CENTRE, CENTRE] + b * b * covariance[CENTRE + 1, CENTRE + 1]
+        fit[_fit.OFFSETS + k] = math.sqrt(square + 2.0 * a * b * covariance[CENTRE, CENTRE + 1])
+        for axis in range(2):
+            fit[_fit.NORMALS + 2 * k + axis], fit[_fit.INWARD + 2 * k + axis] = faces[k, axis], inward[k, axis]
+        fit[_fit.BEND + k], fit[_fit.COUNTS + k], fit[_fit.SIGMA + k] = bend[k], number[k], spread[k]
+    place = 0.0
+    for m in range(CENTRE, TURN):
+        place += covariance[m, m]
+    fit[_fit.POSITION_STD] = math.sqrt(place)
+    fit[_fit.RADIUS_STD] = math.sqrt(covariance[SIZE, SIZE]) if shape[RADIUS] > 0.0 else math.nan
+    fit[_fit.ANGLE_STD] = math.sqrt(covariance[TURN, TURN] + covariance[TURN + 1, TURN + 1])
+    fit[_fit.TURN_STD] = math.sqrt(covariance[0, 0] + covariance[1, 1])
