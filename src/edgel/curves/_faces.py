@@ -17,12 +17,15 @@ from edgel._kernels.parallel import kernel
 from edgel.curves import _fit
 from edgel.curves._circle import RADIUS, local
 from edgel.curves._fit import BENT, CENTRE, HEIGHT, SIZE, TURN, UNKNOWNS
+from edgel.curves._gather import gather
 from edgel.curves._profile import choose_sides, face_of, in_profile, mean_normals
 
 _TOLERANCES = (1.1, 0.8, 0.55)
 """Spacings: how far points of a face may lie from it, round after round; then four deviations."""
 _ROUNDS, _BENDING, _SQUARING = 8, 4, 5
 """Rounds, and those from which faces may bend, and after which they are squared up."""
+_MARGIN = 0.5  # spacings, over the reach: the edge may move
+_ROOM = 4096  # points beside a shape that there is room for to begin with
 _FEWER = 160  # points that the first rounds look at, about
 LEAST = 8
 """Points of a face: with fewer it is none."""
@@ -39,27 +42,32 @@ _LIMIT = 0.3  # radians: no round turns anything by more
 
 @kernel
 def fit_faces(
-    start, stop, which, reach, shapes, beside, begin, rows, first, position, normals, spacing, ranges, fits, covariances
+    start, stop, which, reach, shapes, places, boxes, rows, first, position, normals, spacing, ranges, fits, covariances
 ):
     """Move shapes to where their faces meet; write what is known of them, and the covariance of all unknowns.
 
-    Takes the points beside each shape, its edge points (rows of `position` and `normals`), from where to where along it
-    they lie, and how far from the edge, in spacings, faces are looked at.
+    Takes the tree of the cloud, the edge points of each shape (rows of `position` and `normals`), from where to where
+    along it they lie, and how far from the edge, in spacings, faces are looked at.
     """
     faces, inward, bend = np.empty((2, 2)), np.empty((2, 2)), np.empty(2)
     spread, number = np.empty(2), np.empty(2)
     system, right, free = np.empty((UNKNOWNS, UNKNOWNS)), np.empty(UNKNOWNS), np.empty(UNKNOWNS, np.bool_)
     lower, inner, parts = np.zeros((UNKNOWNS, UNKNOWNS)), np.zeros((UNKNOWNS, UNKNOWNS)), np.empty((2, 8, 9))
-    terms = np.empty(8)
+    terms, scratch, profile = np.empty(8), np.empty((_ROOM, 3)), np.empty((_ROOM, 2))
     for q in range(start, stop):
         k = which[q]
         shape, fit, covariance, h, own = shapes[q], fits[q], covariances[q], spacing[k], rows[first[k] : first[k + 1]]
         is_line = shape[RADIUS] == 0.0
-        near, profile, lever = _inside(
-            shape, beside[begin[k] : begin[k + 1]], ranges[k, 0], ranges[k, 1], (reach + 1.5) * h, h
-        )
+        low, high, lever = _span(shape, ranges[k, 0], ranges[k, 1], h)
+        number_near = gather(places, boxes, shape, low, high, (reach + _MARGIN) * h, scratch)
+        if number_near > len(scratch):
+            scratch, profile = np.empty((2 * number_near, 3)), np.empty((2 * number_near, 2))
+            number_near = gather(places, boxes, shape, low, high, (reach + _MARGIN) * h, scratch)
+        near = scratch[:number_near]
+        for i in range(number_near):
+            profile[i, 0], profile[i, 1], _ = in_profile(shape, near[i, 0], near[i, 1], near[i, 2])
         mean_normals(shape, own, position, normals, faces)
-        choose_sides(profile, h, 0.8 * h, faces, inward)
+        choose_sides(profile[:number_near], h, 0.8 * h, faces, inward)
         for m in range(UNKNOWNS):
             free[m] = m < BENT and not (is_line and (m == SIZE or m == HEIGHT))
         for k in range(2):
@@ -100,32 +108,19 @@ def fit_faces(
 
 
 @kernel
-def _inside(shape, beside, low, high, reach, h):
-    """Return the points beside a shape that are not past its ends, their profile, and the lever of a tilt.
+def _span(shape, low, high, h):
+    """Return from where to where along a shape its faces are looked at, and the lever of a tilt.
 
     The origin of a line moves to its middle.
     """
-    is_line = shape[RADIUS] == 0.0
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
-    around = 2.0 * math.pi * shape[RADIUS]
-    margin = math.inf if half > 0.35 * around and not is_line else half + 0.5 * h
-    if is_line:
-        for axis in range(3):
-            shape[axis] += middle * shape[9 + axis]
-        middle = 0.0
-    near, profile = np.empty((len(beside), 3)), np.empty((len(beside), 2))
-    number = 0
-    for i in range(len(beside)):
-        x, y, z = beside[i, 0], beside[i, 1], beside[i, 2]
-        p, q, along = in_profile(shape, x, y, z)
-        along -= middle
-        if not is_line:
-            along -= around * math.floor(along / around + 0.5)
-        if abs(along) <= margin and p * p + q * q <= reach * reach:
-            near[number, 0], near[number, 1], near[number, 2] = x, y, z
-            profile[number, 0], profile[number, 1] = p, q
-            number += 1
-    return near[:number], profile[:number], max(half, h) if is_line else shape[RADIUS]
+    if shape[RADIUS] > 0.0:
+        round_ = math.pi * shape[RADIUS]
+        margin = round_ if half > 0.7 * round_ else half + 0.5 * h
+        return middle - margin, middle + margin, shape[RADIUS]
+    for axis in range(3):
+        shape[axis] += middle * shape[9 + axis]
+    return -half - 0.5 * h, half + 0.5 * h, max(half, h)
 
 
 @kernel

@@ -11,12 +11,13 @@ from edgel._neighbors.kdtree import NeighborIndex
 from edgel.curves import _fit
 from edgel.curves._circle import RADIUS, fit_line
 from edgel.curves._faces import fit_faces
-from edgel.curves._gather import REACH, Beside, gather
 from edgel.curves._points import EdgePoints
 from edgel.curves._ranges import ranges_of
 from edgel.edges import EdgeKind
 
-_SHORT, _SHORTEST = 2.4, 1.5  # spacings: of faces too small for REACH
+REACH = 4.5
+"""Spacings: so far from a curve its faces are measured."""
+_SHORT, _SHORTEST = 2.4, 1.5  # of faces too small for that
 _ROUGH = 0.15  # spacings: a face is that rough without the cloud being noisy
 _ROUGHER = 1.35  # times the noise of the cloud: no plane, cylinder or cone is rougher
 _COVERED = 0.2  # of the points that a face of full depth would have
@@ -43,8 +44,6 @@ class Measured:
         From where to where along each its edge points lie.
     holds : (K,) bool
         Whether its faces confirm it.
-    beside : Beside
-        The points of the cloud that they were measured on.
     """
 
     shape: np.ndarray
@@ -52,7 +51,6 @@ class Measured:
     covariance: np.ndarray
     ranges: np.ndarray
     holds: np.ndarray
-    beside: Beside
 
 
 def measure(
@@ -70,9 +68,8 @@ def measure(
     of them, since small parts have small faces, and an arc that is no arc as a line.
     """
     ranges = ranges_of(shapes, rows, position)
-    beside = gather(index, shapes, ranges, spacing)
     outline = _outlines(points, rows)
-    best = _attempt(shapes, np.arange(len(shapes)), REACH, beside, rows, points, spacing, ranges)
+    best = _attempt(shapes, np.arange(len(shapes)), REACH, index, rows, points, spacing, ranges)
     noise = _noise_of(best, spacing)
     good = _holds(best, noise, spacing, outline)
     lines = np.zeros_like(shapes)
@@ -84,7 +81,7 @@ def measure(
             continue
         begin = lines if straight else shapes
         along = ranges_of(begin, rows, position) if straight else ranges
-        other = _attempt(begin, which, reach, beside, rows, points, spacing, along)
+        other = _attempt(begin, which, reach, index, rows, points, spacing, along)
         holds = _holds(other, noise, spacing[which], outline[which])
         better = holds & (
             ~good[which] | (straight & (_rough(other) < 1.15 * _rough(best)[which] + 0.02 * spacing[which]))
@@ -92,7 +89,7 @@ def measure(
         for name in ("shape", "fit", "covariance", "ranges"):
             getattr(best, name)[which[better]] = getattr(other, name)[better]
         good[which[better]] = True
-    return Measured(best.shape, best.fit, best.covariance, ranges_of(best.shape, rows, position), good, beside)
+    return Measured(best.shape, best.fit, best.covariance, ranges_of(best.shape, rows, position), good)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +104,7 @@ def _attempt(
     shapes: np.ndarray,
     which: np.ndarray,
     reach: float,
-    beside: Beside,
+    index: NeighborIndex,
     rows: tuple[np.ndarray, np.ndarray],
     points: EdgePoints,
     spacing: np.ndarray,
@@ -117,7 +114,7 @@ def _attempt(
     shape, fit = shapes[which], np.full((len(which), _fit.FIT), np.nan)
     fit[:, _fit.STATE] = _fit.NONE
     covariance = np.zeros((len(which), _fit.UNKNOWNS, _fit.UNKNOWNS))
-    arguments = (which, reach, shape, beside.xyz, beside.start, *rows, points.position, points.normals)
+    arguments = (which, reach, shape, index.xyz, index.boxes, *rows, points.position, points.normals)
     run_slices(fit_faces, len(which), *arguments, spacing, ranges, fit, covariance, size=8)
     return _Attempt(shape, fit, covariance, ranges[which].copy())
 

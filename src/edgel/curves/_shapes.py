@@ -96,10 +96,8 @@ def take_rows(rows: tuple[np.ndarray, np.ndarray], kept: np.ndarray) -> tuple[np
 
 
 def _take(measured: Measured, kept: np.ndarray) -> Measured:
-    points, start = take_rows((measured.beside.xyz, measured.beside.start), kept)
-    beside = type(measured.beside)(points, start)
     names = ("shape", "fit", "covariance", "ranges", "holds")
-    return replace(measured, beside=beside, **{name: getattr(measured, name)[kept] for name in names})
+    return replace(measured, **{name: getattr(measured, name)[kept] for name in names})
 
 
 def _left(

@@ -77,7 +77,7 @@ class Strands:
 def find_strands(shapes: Shapes, points: EdgePoints) -> Strands:
     """Find where shapes are edges, and which runs are worth keeping."""
     measured, position = shapes.measured, shapes.smoothed.position
-    found = extents(measured, shapes.rows, position, measured.ranges, shapes.spacing)
+    found = extents(measured, points.index, shapes.rows, position, measured.ranges, shapes.spacing)
     on = found.shape
     length = np.bincount(on, (found.ends[:, 1] - found.ends[:, 0]) / shapes.spacing[on], len(shapes.spacing))
     kept = _evident(measured.fit, shapes.rows, points.strength, np.maximum(length, 1.0))[on]
