@@ -43,8 +43,7 @@ def assemble(strands: Strands, points: EdgePoints, edges: Edges, origin: np.ndar
     loop, is_hole = find_loops(strands, nodes, vertices, start, edge, points)
     radius = np.where(kinds >= CurveKind.ARC, strands.shape[:, RADIUS], np.nan)
     radius[kinds == CurveKind.POLYLINE] = np.nan
-    paths = np.split(vertices, start[1:-1]) if len(strands) else []
-    length = np.array([np.linalg.norm(np.diff(path, axis=0), axis=1).sum() for path in paths], float)
+    length = _lengths(vertices, start)
     is_arc = np.isfinite(radius)
     length[is_arc] = (strands.along[:, 1] - strands.along[:, 0])[is_arc]
     return Curves(
@@ -162,32 +161,35 @@ def _kinds_of(strands: Strands) -> np.ndarray:
 
 def _vertices(strands: Strands, nodes: Nodes) -> tuple[np.ndarray, np.ndarray]:
     """Return the places along all strands, and where each strand's begin."""
-    paths = []
-    for k in range(len(strands)):
-        ends = [nodes.position[n] if n >= 0 else None for n in nodes.of_end[k]]
-        radius = strands.shape[k, RADIUS]
-        if np.isnan(radius):
-            path = strands.path_of(k)
-            path = np.concatenate([path, path[:1]]) if strands.closed[k] else path
-        else:
-            low, high = strands.along[k]
-            steps = 1
-            if radius > 0:
-                turn = 2 * np.arccos(max(1 - _CHORD * strands.spacing[k] / radius, 0.5))
-                steps = max(int(np.ceil((high - low) / radius / turn)), 2)
-            along = np.linspace(low, high, steps + 1)
-            path = on_shapes(np.repeat(strands.shape[k : k + 1], steps + 1, axis=0), along)
-            if strands.closed[k]:
-                path[-1] = path[0]
-        # Lines run from node to node; arcs were fitted again to pass through theirs, and are not bent.
-        is_line = radius == 0
-        if ends[0] is not None and not radius > 0:
-            path = np.concatenate([ends[0][None], path[1 if is_line else 0 :]])
-        if ends[1] is not None and not radius > 0:
-            path = np.concatenate([path[: -1 if is_line else None], ends[1][None]])
-        paths.append(path)
-    start = np.concatenate([[0], np.cumsum([len(path) for path in paths])]).astype(np.int64)
-    return np.concatenate(paths) if paths else np.empty((0, 3)), start
+    is_run, radius = strands.is_run, np.nan_to_num(strands.shape[:, RADIUS])
+    low, span = strands.along[:, 0], strands.along[:, 1] - strands.along[:, 0]
+    meets = nodes.of_end >= 0
+    curved = radius > 0
+    round_ = np.where(curved, radius, 1.0)
+    turn = 2 * np.arccos(np.maximum(1 - _CHORD * strands.spacing / round_, 0.5))
+    steps = np.where(curved, np.maximum(np.ceil(span / round_ / turn), 2), 1).astype(np.int64)
+    counts = np.where(is_run, np.diff(strands.rows[1]) + strands.closed + meets.sum(axis=1), steps + 1)
+    start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+    owner = np.repeat(np.arange(len(strands)), counts)
+    at = (np.arange(len(owner)) - start[owner]) / steps[owner]
+    vertices = on_shapes(strands.shape[owner], low[owner] + at * span[owner])
+    vertices[start[1:][strands.closed] - 1] = vertices[start[:-1][strands.closed]]
+    for run in np.flatnonzero(is_run):
+        path = strands.path_of(run)
+        before, after = (nodes.position[nodes.of_end[run, end : end + 1][meets[run, end : end + 1]]] for end in (0, 1))
+        vertices[start[run] : start[run + 1]] = np.concatenate([before, path, path[: int(strands.closed[run])], after])
+    # Lines run from node to node; arcs were fitted again to pass through theirs, and are not bent.
+    for end, place in ((0, start[:-1]), (1, start[1:] - 1)):
+        lines = meets[:, end] & ~is_run & ~curved
+        vertices[place[lines]] = nodes.position[nodes.of_end[lines, end]]
+    return vertices, start
+
+
+def _lengths(vertices: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """Return the lengths of paths, given where each begins among all places."""
+    step = np.linalg.norm(np.diff(vertices, axis=0, append=vertices[-1:]), axis=1)
+    step[start[1:] - 1] = 0.0
+    return np.add.reduceat(step, start[:-1]) if len(step) else np.empty(0)
 
 
 def _directions(strands: Strands, vertices: np.ndarray, start: np.ndarray, kinds: np.ndarray) -> np.ndarray:

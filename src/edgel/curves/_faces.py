@@ -26,7 +26,8 @@ _ROUNDS, _BENDING, _SQUARING = 8, 4, 5
 """Rounds, and those from which faces may bend, and after which they are squared up."""
 _MARGIN = 0.5  # spacings, over the reach: the edge may move
 _ROOM = 4096  # points beside a shape that there is room for to begin with
-_FEWER = 160  # points that the first rounds look at, about
+_FEWER = 80  # points that the first rounds look at, about
+_STRIPE = 0.5  # spacings
 LEAST = 8
 """Points of a face: with fewer it is none."""
 FLOOR = 0.03
@@ -37,6 +38,7 @@ _CORRELATED = 3.0  # edge points next to each other come from the same points of
 _SURELY, _STRAIGHT = 2.5, 0.004  # deviations, and 1 / spacings: a face bends that bends by more
 _CHANCE = 2.2  # deviations of an amplitude
 _FIRM = 1e-4  # weight of one point for what no point decides
+_SETTLED = 2e-3  # of a step in spacings, or radians: smaller ones change nothing
 _LIMIT = 0.3  # radians: no round turns anything by more
 
 
@@ -64,8 +66,7 @@ def fit_faces(
             scratch, profile = np.empty((2 * number_near, 3)), np.empty((2 * number_near, 2))
             number_near = gather(places, boxes, shape, low, high, (reach + _MARGIN) * h, scratch)
         near = scratch[:number_near]
-        for i in range(number_near):
-            profile[i, 0], profile[i, 1], _ = in_profile(shape, near[i, 0], near[i, 1], near[i, 2])
+        fewer = _put_some_first(shape, near, h, profile)
         mean_normals(shape, own, position, normals, faces)
         choose_sides(profile[:number_near], h, 0.8 * h, faces, inward)
         for m in range(UNKNOWNS):
@@ -77,8 +78,8 @@ def fit_faces(
             tolerance = _TOLERANCES[turn] * h if turn < len(_TOLERANCES) else min(max(4.0 * sigma, 0.15 * h), 1.2 * h)
             if turn == _BENDING:
                 free[BENT] = free[BENT + 1] = True
-            stride = max(len(near) // _FEWER, 1) if turn < _BENDING else 1
-            _collect(shape, near, stride, h, lever, reach, tolerance, faces, inward, bend, spread, parts, terms, number)
+            some = near[:fewer] if turn < _BENDING else near
+            _collect(shape, some, h, lever, reach, tolerance, faces, inward, bend, spread, parts, terms, number)
             _put_together(parts, system, right)
             sigma = _spread_of(parts, number, turn, faces, spread)
             if sigma < 0.0:
@@ -100,8 +101,9 @@ def fit_faces(
                 lever = shape[RADIUS]
                 if turn == _SQUARING:
                     _square_up(faces, inward, covariance, free)
-            if turn == _ROUNDS - 1:
+            if turn == _ROUNDS - 1 or (turn > _SQUARING and _is_small(right)):
                 fit[_fit.STATE] = _fit.MEASURED if both else _fit.EDGE_ALONE
+                break
         if fit[_fit.STATE] != _fit.NONE:
             _write(shape, faces, inward, bend, number, spread, covariance, fit)
             fit[_fit.RIPPLE] = 0.0 if is_line else _ripple(shape, near, h, reach, sigma, faces, inward, bend)
@@ -124,6 +126,27 @@ def _span(shape, low, high, h):
 
 
 @kernel
+def _put_some_first(shape, near, h, profile):
+    """Put the points of every so many stripes across a shape first, return their number, and write all profiles.
+
+    Which those are depends on their places beside the shape alone, and not on the tree.
+    """
+    every, first = max(len(near) // _FEWER, 1), 0
+    for i in range(len(near)):
+        x, y, z = near[i, 0], near[i, 1], near[i, 2]
+        p, q, along = in_profile(shape, x, y, z)
+        profile[i, 0], profile[i, 1] = p, q
+        if int(math.floor(along / (_STRIPE * h))) % every == 0:
+            for axis in range(3):
+                near[i, axis] = near[first, axis]
+            near[first, 0], near[first, 1], near[first, 2] = x, y, z
+            profile[i, 0], profile[i, 1] = profile[first, 0], profile[first, 1]
+            profile[first, 0], profile[first, 1] = p, q
+            first += 1
+    return first
+
+
+@kernel
 def _derivatives(shape, x, y, z, a, b, h, lever, terms):
     """Write how a distance with normal (a, b) in the profile changes with tilt, place, radius and height."""
     by_tilt = h / lever
@@ -138,7 +161,7 @@ def _derivatives(shape, x, y, z, a, b, h, lever, terms):
 
 
 @kernel
-def _collect(shape, near, stride, h, lever, reach, tolerance, faces, inward, bend, spread, parts, terms, number):
+def _collect(shape, near, h, lever, reach, tolerance, faces, inward, bend, spread, parts, terms, number):
     """Add up the equations of the points of each face, by its spread, and count them.
 
     `parts` (2, 8, 9) holds a triangle of products of tilt, place, the face's turn and bend, radius and height; in the
@@ -150,7 +173,7 @@ def _collect(shape, near, stride, h, lever, reach, tolerance, faces, inward, ben
             for n in range(9):
                 parts[k, m, n] = 0.0
     size = 6 if shape[RADIUS] == 0.0 else 8
-    for i in range(0, len(near), stride):
+    for i in range(len(near)):
         x, y, z = local(shape, near[i, 0], near[i, 1], near[i, 2])
         p, q = (x, y) if size == 6 else (math.sqrt(x * x + y * y) - shape[RADIUS], z)
         k, off, along = face_of(p, q, h, tolerance, reach, faces, inward, bend)
@@ -159,7 +182,7 @@ def _collect(shape, near, stride, h, lever, reach, tolerance, faces, inward, ben
         _derivatives(shape, x, y, z, faces[k, 0], faces[k, 1], h, lever, terms)
         terms[4], terms[5] = along, -along * along / h
         weight = (1.0 - (off / tolerance) ** 2) ** 2
-        number[k] += stride
+        number[k] += 1.0
         parts[k, 0, 1] += weight
         parts[k, 0, 2] += weight * off * off
         weight /= max(spread[k], FLOOR * h) ** 2
@@ -265,6 +288,14 @@ def _solve(system, right, free, h, lever, lower, inner, covariance, judge):
                 covariance[m, n] *= _unit_of(m, h, lever) * _unit_of(n, h, lever)
             else:
                 covariance[m, n] = 0.0
+
+
+@kernel
+def _is_small(step):
+    for m in range(BENT):
+        if abs(step[m]) > _SETTLED:
+            return False
+    return True
 
 
 @kernel
