@@ -108,7 +108,10 @@ def _join(a, b, ring, places, tangents, squares, rights, curve, shapes, spacing)
     for pair in range(len(a)):
         one, two = a[pair], b[pair]
         count = _members(one, ring, members)
-        if (members[:count] == two).any():
+        together = False
+        for q in range(count):
+            together |= members[q] == two
+        if together:
             continue
         ring[one], ring[two] = ring[two], ring[one]
         if not _agrees(one, ring, places, tangents, squares, rights, curve, shapes, spacing):
@@ -130,24 +133,24 @@ def _members(end, ring, members):
 @kernel
 def _solve(members, count, places, squares, rights, spacing, curve, position):
     """Write where the planes of some ends meet, and return the standard deviation of that place."""
-    matrix, side, mean = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
-    h = 0.0
+    h = xx = xy = xz = yy = yz = zz = x = y = z = 0.0
+    for q in range(count):
+        h += spacing[curve[members[q]]] / count
+    prior = 1.0 / (PRIOR * h) ** 2
     for q in range(count):
         i = members[q]
-        matrix += squares[i]
-        side += rights[i]
-        mean += places[i] / count
-        h += spacing[curve[i]] / count
-    prior = 1.0 / (PRIOR * h) ** 2
-    for axis in range(3):
-        matrix[axis, axis] += prior
-        side[axis] += prior * mean[axis]
-    inverse = np.linalg.inv(matrix)
-    for axis in range(3):
-        position[axis] = 0.0
-        for other in range(3):
-            position[axis] += inverse[axis, other] * side[other]
-    return math.sqrt(inverse[0, 0] + inverse[1, 1] + inverse[2, 2])
+        xx, xy, xz = xx + squares[i, 0, 0], xy + squares[i, 0, 1], xz + squares[i, 0, 2]
+        yy, yz, zz = yy + squares[i, 1, 1], yz + squares[i, 1, 2], zz + squares[i, 2, 2]
+        x, y = x + rights[i, 0] + prior * places[i, 0] / count, y + rights[i, 1] + prior * places[i, 1] / count
+        z += rights[i, 2] + prior * places[i, 2] / count
+    xx, yy, zz = xx + prior, yy + prior, zz + prior
+    # Cofactors of the symmetric matrix, over its determinant.
+    a, b, c = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
+    d, e, f = xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy
+    det = xx * a + xy * b + xz * c
+    position[0], position[1] = (a * x + b * y + c * z) / det, (b * x + d * y + e * z) / det
+    position[2] = (c * x + e * y + f * z) / det
+    return math.sqrt((a + d + f) / det)
 
 
 @kernel
@@ -165,9 +168,9 @@ def _agrees(end, ring, places, tangents, squares, rights, curve, shapes, spacing
     for q in range(count):
         i = members[q]
         h = spacing[curve[i]]
-        d = position - places[i]
-        along = d[0] * tangents[i, 0] + d[1] * tangents[i, 1] + d[2] * tangents[i, 2]
-        square = d[0] ** 2 + d[1] ** 2 + d[2] ** 2
+        x, y, z = position[0] - places[i, 0], position[1] - places[i, 1], position[2] - places[i, 2]
+        along = x * tangents[i, 0] + y * tangents[i, 1] + z * tangents[i, 2]
+        square = x * x + y * y + z * z
         if math.sqrt(square) > REACH * h:
             return False
         if math.isfinite(shapes[curve[i], RADIUS]):
