@@ -10,7 +10,7 @@ import numpy as np
 from edgel._kernels.parallel import kernel
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import knn
-from edgel.curves._circle import RADIUS, offset_of
+from edgel.curves._circle import RADIUS, offset_of, tangent_of
 
 REACH = 3.5
 """Spacings: so far from where its points end a curve meets others."""
@@ -186,22 +186,24 @@ def _agrees(end, ring, places, tangents, squares, rights, curve, shapes, spacing
 def _settle(ring, number, places, tangents, squares, rights, curve, shapes, spacing, position, std, is_corner):
     """Number the groups of several ends, write what each is, and return how many there are."""
     found = 0
-    members = np.empty(2 * _MOST, np.int64)
+    members, ways = np.empty(2 * _MOST, np.int64), np.empty((2 * _MOST, 3))
     number[:] = -1
     for end in range(len(ring)):
         count = _members(end, ring, members)
         if count < 2 or number[end] >= 0:
             continue
-        std[found] = _solve(members, count, places, squares, rights, spacing, curve, position[found])
+        node = position[found]
+        std[found] = _solve(members, count, places, squares, rights, spacing, curve, node)
         straight = 1.0
         for q in range(count):
-            number[members[q]] = found
+            i = members[q]
+            number[i] = found
+            x, y, z = tangents[i, 0], tangents[i, 1], tangents[i, 2]
+            if math.isfinite(shapes[curve[i], RADIUS]):  # an arc has turned on the way from its end to the node
+                x, y, z = tangent_of(shapes[curve[i]], node[0], node[1], node[2])
+            ways[q, 0], ways[q, 1], ways[q, 2] = x, y, z
             for r in range(q):
-                i, j = members[q], members[r]
-                cosine = abs(
-                    tangents[i, 0] * tangents[j, 0] + tangents[i, 1] * tangents[j, 1] + tangents[i, 2] * tangents[j, 2]
-                )
-                straight = min(straight, cosine)
+                straight = min(straight, abs(x * ways[r, 0] + y * ways[r, 1] + z * ways[r, 2]))
         is_corner[found] = straight < CORNER
         found += 1
     return found

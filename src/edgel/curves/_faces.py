@@ -28,6 +28,8 @@ _MARGIN = 0.5  # spacings, over the reach: the edge may move
 _ROOM = 4096  # points beside a shape that there is room for to begin with
 _FEWER = 80  # points that the first rounds look at, about
 _STRIPE = 0.5  # spacings
+_BIN, _FIRST = 0.6, 2  # spacings of depth, and the first of them, counted from the edge, that may be beyond a face
+_THIN, _BLUR, _SHALLOW = 0.35, 0.4, 1.3  # of the points at the edge; spacings
 LEAST = 8
 """Points of a face: with fewer it is none."""
 FLOOR = 0.03
@@ -52,7 +54,7 @@ def fit_faces(
     along it they lie, and how far from the edge, in spacings, faces are looked at.
     """
     faces, inward, bend = np.empty((2, 2)), np.empty((2, 2)), np.empty(2)
-    spread, number = np.empty(2), np.empty(2)
+    spread, number, depth = np.empty(2), np.empty(2), np.empty(2)
     system, right, free = np.empty((UNKNOWNS, UNKNOWNS)), np.empty(UNKNOWNS), np.empty(UNKNOWNS, np.bool_)
     lower, inner, parts = np.zeros((UNKNOWNS, UNKNOWNS)), np.zeros((UNKNOWNS, UNKNOWNS)), np.empty((2, 8, 9))
     terms, scratch, profile = np.empty(8), np.empty((_ROOM, 3)), np.empty((_ROOM, 2))
@@ -72,14 +74,17 @@ def fit_faces(
         for m in range(UNKNOWNS):
             free[m] = m < BENT and not (is_line and (m == SIZE or m == HEIGHT))
         for k in range(2):
-            bend[k], spread[k] = 0.0, 0.3 * h
+            bend[k], spread[k], depth[k] = 0.0, 0.3 * h, reach * h
         sigma, both, fit[_fit.STATE] = 0.3 * h, False, _fit.NONE
         for turn in range(_ROUNDS):
             tolerance = _TOLERANCES[turn] * h if turn < len(_TOLERANCES) else min(max(4.0 * sigma, 0.15 * h), 1.2 * h)
             if turn == _BENDING:
                 free[BENT] = free[BENT + 1] = True
             some = near[:fewer] if turn < _BENDING else near
-            _collect(shape, some, h, lever, reach, tolerance, faces, inward, bend, spread, parts, terms, number)
+            if turn == len(_TOLERANCES):
+                for k in range(2):
+                    depth[k] = _depth_of(k, shape, near, h, 0.55 * h, depth, faces, inward, bend, terms)
+            _collect(shape, some, h, lever, depth, tolerance, faces, inward, bend, spread, parts, terms, number)
             _put_together(parts, system, right)
             sigma = _spread_of(parts, number, turn, faces, spread)
             if sigma < 0.0:
@@ -106,7 +111,7 @@ def fit_faces(
                 break
         if fit[_fit.STATE] != _fit.NONE:
             _write(shape, faces, inward, bend, number, spread, covariance, fit)
-            fit[_fit.RIPPLE] = 0.0 if is_line else _ripple(shape, near, h, reach, sigma, faces, inward, bend)
+            fit[_fit.RIPPLE] = 0.0 if is_line else _ripple(shape, near, h, depth, sigma, faces, inward, bend)
 
 
 @kernel
@@ -161,7 +166,7 @@ def _derivatives(shape, x, y, z, a, b, h, lever, terms):
 
 
 @kernel
-def _collect(shape, near, h, lever, reach, tolerance, faces, inward, bend, spread, parts, terms, number):
+def _collect(shape, near, h, lever, depth, tolerance, faces, inward, bend, spread, parts, terms, number):
     """Add up the equations of the points of each face, by its spread, and count them.
 
     `parts` (2, 8, 9) holds a triangle of products of tilt, place, the face's turn and bend, radius and height; in the
@@ -176,7 +181,7 @@ def _collect(shape, near, h, lever, reach, tolerance, faces, inward, bend, sprea
     for i in range(len(near)):
         x, y, z = local(shape, near[i, 0], near[i, 1], near[i, 2])
         p, q = (x, y) if size == 6 else (math.sqrt(x * x + y * y) - shape[RADIUS], z)
-        k, off, along = face_of(p, q, h, tolerance, reach, faces, inward, bend)
+        k, off, along = face_of(p, q, h, tolerance, depth, faces, inward, bend)
         if k < 0:
             continue
         _derivatives(shape, x, y, z, faces[k, 0], faces[k, 1], h, lever, terms)
@@ -191,6 +196,26 @@ def _collect(shape, near, h, lever, reach, tolerance, faces, inward, bend, sprea
             parts[k, m, 8] -= one * off
             for n in range(m + 1):
                 parts[k, m, n] += one * terms[n]
+
+
+@kernel
+def _depth_of(face, shape, near, h, tolerance, depth, faces, inward, bend, counts):
+    """Return how deep a face goes: so far, less what noise blurs, as its points lie as densely as they do at the edge.
+
+    Beyond its end there is another face, whose points would tilt this one.
+    """
+    bins = min(int(depth[face] / (_BIN * h)), len(counts))
+    for b in range(bins):
+        counts[b] = 0.0
+    for i in range(len(near)):
+        p, q, _ = in_profile(shape, near[i, 0], near[i, 1], near[i, 2])
+        k, _, along = face_of(p, q, h, tolerance, depth, faces, inward, bend)
+        if k == face and along < bins * _BIN * h:
+            counts[int(along / (_BIN * h))] += 1.0
+    for b in range(_FIRST, bins - 1):
+        if max(counts[b], counts[b + 1]) < _THIN * counts[_FIRST - 1]:
+            return max((b * _BIN - _BLUR) * h, _SHALLOW * h)
+    return depth[face]
 
 
 @kernel
@@ -356,7 +381,7 @@ def _square_up(faces, inward, covariance, free):
 
 
 @kernel
-def _ripple(shape, near, h, reach, sigma, faces, inward, bend):
+def _ripple(shape, near, h, depth, sigma, faces, inward, bend):
     """Return by how much more than chance a wall goes in and out three to six times on the way round."""
     wall = 0 if abs(faces[0, 0]) >= abs(faces[1, 0]) else 1
     tolerance = min(max(4.0 * sigma, 0.15 * h), 1.2 * h) + 0.3 * h
@@ -365,7 +390,7 @@ def _ripple(shape, near, h, reach, sigma, faces, inward, bend):
         along, across, count, square = 0.0, 0.0, 0, 0.0
         for i in range(len(near)):
             p, q, turn = in_profile(shape, near[i, 0], near[i, 1], near[i, 2])
-            k, off, _ = face_of(p, q, h, tolerance, reach, faces, inward, bend)
+            k, off, _ = face_of(p, q, h, tolerance, depth, faces, inward, bend)
             if k != wall:
                 continue
             count += 1
