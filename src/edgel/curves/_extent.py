@@ -50,15 +50,16 @@ def extents(
     position: np.ndarray,
     ranges: np.ndarray,
     spacing: np.ndarray,
+    share: float = 0.0,
 ) -> Extents:
     """Find where measured shapes are edges, in bins of a spacing.
 
     Takes the edge points that each owns (as rows of `position`, and where each shape's begin), and the ranges (K, 2)
-    in which they lie.
+    in which they lie; beyond these it looks 4 spacings far, and at least a share of their length.
     """
     shapes = measured.shape
     count = len(shapes)
-    low, high, whole = widened(shapes, ranges, spacing)
+    low, high, whole = widened(shapes, ranges, spacing, share)
     ends, closed = np.zeros((count, _MOST, 2)), np.zeros((count, _MOST), np.bool_)
     found, number = np.zeros((count, _MOST), np.int64), np.zeros(count, np.int64)
     arguments = (shapes, measured.fit, index.xyz, index.boxes, *owned, position, spacing, low, high, whole)

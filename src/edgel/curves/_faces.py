@@ -72,7 +72,7 @@ def fit_faces(
         mean_normals(shape, own, position, normals, faces)
         choose_sides(profile[:number_near], h, 0.8 * h, faces, inward)
         for m in range(UNKNOWNS):
-            free[m] = m < BENT and not (is_line and (m == SIZE or m == HEIGHT))
+            free[m] = m < BENT and not (is_line and m in (SIZE, HEIGHT))
         for k in range(2):
             bend[k], spread[k], depth[k] = 0.0, 0.3 * h, reach * h
         sigma, both, fit[_fit.STATE] = 0.3 * h, False, _fit.NONE
@@ -141,7 +141,7 @@ def _put_some_first(shape, near, h, profile):
         x, y, z = near[i, 0], near[i, 1], near[i, 2]
         p, q, along = in_profile(shape, x, y, z)
         profile[i, 0], profile[i, 1] = p, q
-        if int(math.floor(along / (_STRIPE * h))) % every == 0:
+        if math.floor(along / (_STRIPE * h)) % every == 0:
             for axis in range(3):
                 near[i, axis] = near[first, axis]
             near[first, 0], near[first, 1], near[first, 2] = x, y, z

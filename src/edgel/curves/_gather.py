@@ -14,9 +14,12 @@ BEYOND = 4.0
 """Spacings: so far past its ends is looked whether a curve goes on."""
 
 
-def widened(shapes: np.ndarray, ranges: np.ndarray, spacing: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return ranges with a margin, low and high, and which go all round."""
-    low, high = ranges[:, 0] - BEYOND * spacing, ranges[:, 1] + BEYOND * spacing
+def widened(
+    shapes: np.ndarray, ranges: np.ndarray, spacing: np.ndarray, share: float = 0.0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return ranges with a margin, at least a share of their length, low and high, and which go all round."""
+    margin = np.maximum(BEYOND * spacing, share * (ranges[:, 1] - ranges[:, 0]))
+    low, high = ranges[:, 0] - margin, ranges[:, 1] + margin
     round_ = 2 * np.pi * shapes[:, RADIUS]
     whole = (round_ > 0) & ((ranges[:, 1] - ranges[:, 0] > 0.3 * round_) | (high - low >= round_))
     middle = 0.5 * (low + high)

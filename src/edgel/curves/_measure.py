@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from edgel._kernels.parallel import kernel, run_slices
 from edgel._neighbors.kdtree import NeighborIndex
 from edgel.curves import _fit
-from edgel.curves._circle import RADIUS, fit_line
+from edgel.curves._circle import RADIUS, SHAPE, fit_circle, fit_line
 from edgel.curves._faces import fit_faces
 from edgel.curves._points import EdgePoints
 from edgel.curves._ranges import ranges_of
@@ -52,6 +52,20 @@ class Measured:
     ranges: np.ndarray
     holds: np.ndarray
 
+    @property
+    def both(self) -> np.ndarray:
+        """Which lie where two faces meet, (K,) bool."""
+        return self.holds & (self.fit[:, _fit.STATE] == _fit.MEASURED)
+
+    def take(self, kept: np.ndarray) -> Measured:
+        """Return some (int)."""
+        return Measured(*(getattr(self, field.name)[kept] for field in fields(self)))
+
+    def and_(self, other: Measured) -> Measured:
+        """Return these and others."""
+        pairs = ((getattr(self, field.name), getattr(other, field.name)) for field in fields(self))
+        return Measured(*(np.concatenate(pair) for pair in pairs))
+
 
 def measure(
     index: NeighborIndex,
@@ -70,10 +84,10 @@ def measure(
     ranges = ranges_of(shapes, rows, position)
     outline = _outlines(points, rows)
     best = _attempt(shapes, np.arange(len(shapes)), REACH, index, rows, points, spacing, ranges)
-    noise = _noise_of(best, spacing)
+    noise = noise_of(best, spacing)
     good = _holds(best, noise, spacing, outline)
     lines = np.zeros_like(shapes)
-    run_slices(_as_lines, len(shapes), lines, *rows, position, size=64)
+    run_slices(_fit_shapes, len(shapes), lines, *rows, position, False, size=64)
     for reach, straight in ((_SHORT, False), (REACH, True), (_SHORT, True), (_SHORTEST, False), (_SHORTEST, True)):
         curved = shapes[:, RADIUS] > 0
         which = np.flatnonzero((~good | _nearly_straight(best, spacing)) & (curved | (not straight)))
@@ -90,6 +104,27 @@ def measure(
             getattr(best, name)[which[better]] = getattr(other, name)[better]
         good[which[better]] = True
     return Measured(best.shape, best.fit, best.covariance, ranges_of(best.shape, rows, position), good)
+
+
+def refit(
+    measured: Measured,
+    which: np.ndarray,
+    ranges: np.ndarray,
+    reach: float,
+    rows: tuple[np.ndarray, np.ndarray],
+    points: EdgePoints,
+    spacing: np.ndarray,
+) -> np.ndarray:
+    """Measure some shapes again over other ranges (W, 2), keep what holds, and return which do, (W,) bool."""
+    along = measured.ranges.copy()
+    along[which] = ranges
+    other = _attempt(measured.shape, which, reach, points.index, rows, points, spacing, along)
+    noise = noise_of(measured, spacing)
+    better = _holds(other, noise, spacing[which], np.zeros(len(which), bool))
+    better &= _rough(other) < 1.15 * _rough(measured)[which] + 0.02 * spacing[which]
+    for name in ("shape", "fit", "covariance", "ranges"):
+        getattr(measured, name)[which[better]] = getattr(other, name)[better]
+    return better
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,11 +154,11 @@ def _attempt(
     return _Attempt(shape, fit, covariance, ranges[which].copy())
 
 
-def _rough(fitted: _Attempt) -> np.ndarray:
+def _rough(fitted: _Attempt | Measured) -> np.ndarray:
     return np.nan_to_num(fitted.fit[:, _fit.SIGMA : _fit.SIGMA + 2], nan=np.inf).max(axis=1)
 
 
-def _noise_of(fitted: _Attempt, spacing: np.ndarray) -> float:
+def noise_of(fitted: _Attempt | Measured, spacing: np.ndarray) -> float:
     """Return how far points lie from faces, in spacings, in the middle of all fits."""
     both = fitted.fit[:, _fit.STATE] == _fit.MEASURED
     return float(np.median(fitted.fit[both, _fit.SIGMA : _fit.SIGMA + 2] / spacing[both, None])) if both.any() else 0.0
@@ -166,7 +201,18 @@ def mean_of(values: np.ndarray, rows: tuple[np.ndarray, np.ndarray]) -> np.ndarr
     return np.add.reduceat(values[rows[0]], rows[1][:-1]) / np.diff(rows[1])
 
 
+def circles_through(rows: tuple[np.ndarray, np.ndarray], position: np.ndarray) -> np.ndarray:
+    """Return the circles (K, 13) through edge points, given as rows of `position` and where each circle's begin."""
+    shapes = np.zeros((len(rows[1]) - 1, SHAPE))
+    run_slices(_fit_shapes, len(shapes), shapes, *rows, position, True, size=64)
+    return shapes
+
+
 @kernel
-def _as_lines(start, stop, lines, rows, first, position):
+def _fit_shapes(start, stop, shapes, rows, first, position, are_round):
     for k in range(start, stop):
-        fit_line(position, rows[first[k] : first[k + 1]], lines[k])
+        own = rows[first[k] : first[k + 1]]
+        if are_round:
+            fit_circle(position, own, shapes[k])
+        else:
+            fit_line(position, own, shapes[k])

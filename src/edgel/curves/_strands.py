@@ -13,7 +13,8 @@ from edgel.curves._corners import Ends
 from edgel.curves._extent import extents
 from edgel.curves._gather import on_shapes
 from edgel.curves._points import EdgePoints
-from edgel.curves._shapes import Shapes, take_rows
+from edgel.curves._rows import take_rows
+from edgel.curves._shapes import Shapes
 
 _EVIDENCE, _STRENGTH = 0.33, 0.3
 """Strength of its edge points, added up, a spacing of a shape; and their mean, at least."""
