@@ -8,10 +8,11 @@ import numpy as np
 
 from edgel.curves import _fit
 from edgel.curves._circle import RADIUS
-from edgel.curves._corners import Nodes, meet
+from edgel.curves._corners import Nodes, meet, without_unsure
 from edgel.curves._curves import CurveKind, Curves
 from edgel.curves._gather import on_shapes
 from edgel.curves._loops import find_loops
+from edgel.curves._measure import noise_of
 from edgel.curves._points import EdgePoints
 from edgel.curves._strands import Strands, along_of_all, ends_of, past
 from edgel.curves._tangent import touch
@@ -29,6 +30,7 @@ _ORDER = (EdgeKind.CREASE, EdgeKind.BOUNDARY, EdgeKind.OCCLUDING, EdgeKind.COLOR
 def assemble(strands: Strands, points: EdgePoints, edges: Edges, origin: np.ndarray, crs: str | None) -> Curves:
     """Make curves of strands."""
     nodes = touch(strands, meet(ends_of(strands), strands.shape, strands.spacing))
+    nodes = without_unsure(nodes, points.position, noise_of(strands, strands.spacing), strands.spacing)
     nodes, through = meet_through(strands, nodes)
     strands = end_at_nodes(strands, nodes)
     kept = np.flatnonzero(_long_enough(strands, nodes))

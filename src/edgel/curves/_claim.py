@@ -10,7 +10,7 @@ from edgel._kernels.parallel import kernel
 from edgel.curves._circle import offset_of, tangent_of
 from edgel.curves._smooth import Smoothed
 
-ASIDE = 0.7
+ASIDE = 1.2
 """Spacings: farther from a shape lies no edge point of it."""
 _ALIKE = 0.7  # cosine between the tangent of an edge point and that of the shape
 _OWN = 0.5  # of a shape's points: with more of them on a surer one it is no shape of its own

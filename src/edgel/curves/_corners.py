@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,9 @@ _ASIDE = 0.7  # spacings: farther from a curve lies no corner of it, unless the 
 _MOST = 8  # ends near each that are tried
 PRIOR = 3.0  # spacings: standard deviation of a corner about the ends, where no face decides
 _FLOOR = 0.02  # spacings: no face is surer
+_UNSURE, _BY_NOISE, _LONE, _NOISY = 0.4, 0.8, 0.9, 0.2
+"""Spacings: corners of two curves that are less sure, what noise adds to that, how far edge points may be;
+and the noise from which on neither tells right from wrong."""
 CORNER = math.cos(math.radians(20.0))  # between tangents: nearer to straight the joint is smooth
 
 
@@ -91,6 +94,26 @@ def meet(ends: Ends, shapes: np.ndarray, spacing: np.ndarray) -> Nodes:
     found = _settle(ring, number, *parts, position, std, is_corner)
     of_end.reshape(-1)[flat] = number
     return Nodes(position[:found], std[:found], is_corner[:found], of_end)
+
+
+def without_unsure(nodes: Nodes, position: np.ndarray, noise: float, spacing: np.ndarray) -> Nodes:
+    """Leave out nodes of two curves whose place is unsure, or where no edge point (E, 3) is.
+
+    A corner of faces has three curves; where there are two, a fillet may run past it, or a curve may just end. Takes
+    the noise in spacings and the spacing (N,) of the curves.
+    """
+    count = len(nodes.position)
+    if not count or noise > _NOISY:
+        return nodes
+    ending = nodes.of_end[nodes.of_end >= 0]
+    uses = np.bincount(ending, minlength=count)
+    h = np.bincount(ending, np.repeat(spacing, 2)[nodes.of_end.ravel() >= 0], count) / np.maximum(uses, 1)
+    far = knn(build_index(position), nodes.position, 1).distances[:, 0]
+    unsure = nodes.std > (_UNSURE + _BY_NOISE * noise) * h
+    lone = far > (_LONE + _BY_NOISE * noise) * h
+    out = nodes.is_corner & (uses == 2) & (unsure | lone)
+    of_end = np.where((nodes.of_end >= 0) & out[nodes.of_end], -1, nodes.of_end)
+    return replace(nodes, of_end=of_end)
 
 
 def _equations(ends: Ends, flat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

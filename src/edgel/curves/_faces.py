@@ -317,10 +317,10 @@ def _solve(system, right, free, h, lever, lower, inner, covariance, judge):
 
 @kernel
 def _is_small(step):
+    largest = 0.0
     for m in range(BENT):
-        if abs(step[m]) > _SETTLED:
-            return False
-    return True
+        largest = max(largest, abs(step[m]))
+    return largest <= _SETTLED
 
 
 @kernel

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -90,7 +91,7 @@ def measure(
     run_slices(_fit_shapes, len(shapes), lines, *rows, position, False, size=64)
     for reach, straight in ((_SHORT, False), (REACH, True), (_SHORT, True), (_SHORTEST, False), (_SHORTEST, True)):
         curved = shapes[:, RADIUS] > 0
-        which = np.flatnonzero((~good | _nearly_straight(best, spacing)) & (curved | (not straight)))
+        which = np.flatnonzero((~good | nearly_straight(best, spacing)) & (curved | (not straight)))
         if not len(which):
             continue
         begin = lines if straight else shapes
@@ -158,13 +159,13 @@ def _rough(fitted: _Attempt | Measured) -> np.ndarray:
     return np.nan_to_num(fitted.fit[:, _fit.SIGMA : _fit.SIGMA + 2], nan=np.inf).max(axis=1)
 
 
-def noise_of(fitted: _Attempt | Measured, spacing: np.ndarray) -> float:
+def noise_of(fitted: Any, spacing: np.ndarray) -> float:
     """Return how far points lie from faces, in spacings, in the middle of all fits."""
     both = fitted.fit[:, _fit.STATE] == _fit.MEASURED
     return float(np.median(fitted.fit[both, _fit.SIGMA : _fit.SIGMA + 2] / spacing[both, None])) if both.any() else 0.0
 
 
-def _nearly_straight(fitted: _Attempt, spacing: np.ndarray) -> np.ndarray:
+def nearly_straight(fitted: _Attempt | Measured, spacing: np.ndarray) -> np.ndarray:
     """Tell which arcs (K,) are so short that lines may be meant."""
     radius = fitted.shape[:, RADIUS]
     length = fitted.ranges[:, 1] - fitted.ranges[:, 0]

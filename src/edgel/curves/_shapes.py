@@ -10,7 +10,7 @@ from edgel.curves._chains import Chains, link
 from edgel.curves._circle import RADIUS
 from edgel.curves._claim import claim
 from edgel.curves._grow import grow
-from edgel.curves._measure import Measured, circles_through, mean_of, measure, noise_of
+from edgel.curves._measure import Measured, circles_through, mean_of, measure, nearly_straight, noise_of
 from edgel.curves._points import EdgePoints
 from edgel.curves._rows import take_rows
 from edgel.curves._smooth import Smoothed, smooth
@@ -54,17 +54,28 @@ def find_shapes(points: EdgePoints) -> Shapes:
     if noise_of(first, spacing) > _NOISY:
         first, paths, spacing = _with_bends(first, paths, pieces.chain, points, smoothed.position)
     first = grow(first, paths, points, smoothed.position, spacing)
-    owner = np.full(len(points), -1)
-    claim(first.shape, _surest_first(first, spacing), paths, smoothed, points.spacing, owner)
-    alive = np.flatnonzero(np.bincount(owner[owner >= 0], minlength=len(spacing)) >= 3)
-    owned = _rows_of(owner, alive, len(spacing))
+    alive, owned, _ = _claimed(first, paths, spacing, smoothed, points)
     # Again, on all that each has now, and from a place that is right.
     spacing = mean_of(points.spacing, owned)
     second = measure(points.index, first.shape[alive], owned, points, smoothed.position, spacing)
     second = grow(second, owned, points, smoothed.position, spacing)
-    kept = np.flatnonzero(second.holds)
-    runs, closed = _left(chains, pieces, paths, np.isin(owner, alive[kept]), points)
-    return Shapes(second.take(kept), spacing[kept], take_rows(owned, kept), runs, closed, smoothed)
+    kept, owned, owner = _claimed(second, owned, spacing, smoothed, points)
+    runs, closed = _left(chains, pieces, paths, owner >= 0, points)
+    return Shapes(second.take(kept), spacing[kept], owned, runs, closed, smoothed)
+
+
+def _claimed(
+    measured: Measured,
+    rows: tuple[np.ndarray, np.ndarray],
+    spacing: np.ndarray,
+    smoothed: Smoothed,
+    points: EdgePoints,
+) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray], np.ndarray]:
+    """Return which shapes have edge points left, these points, and the shape (E,) of each edge point; -1 for none."""
+    owner = np.full(len(points), -1)
+    claim(measured.shape, _surest_first(measured, spacing), rows, smoothed, points.spacing, owner)
+    alive = np.flatnonzero(np.bincount(owner[owner >= 0], minlength=len(spacing)) >= 3)
+    return alive, _rows_of(owner, alive, len(spacing)), owner
 
 
 def _with_bends(
@@ -83,7 +94,7 @@ def _with_bends(
     longer = np.concatenate([rows[0][:0], *runs]), start
     spacing = mean_of(points.spacing, longer)
     bends = measure(points.index, circles_through(longer, position), longer, points, position, spacing)
-    kept = np.flatnonzero(bends.both & (bends.shape[:, RADIUS] > 0))
+    kept = np.flatnonzero(bends.both & (bends.shape[:, RADIUS] > 0) & ~nearly_straight(bends, spacing))
     more = take_rows(longer, kept)
     every = np.concatenate([rows[0], more[0]]), np.concatenate([rows[1], rows[1][-1] + more[1][1:]])
     return measured.and_(bends.take(kept)), every, mean_of(points.spacing, every)
