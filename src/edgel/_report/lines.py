@@ -30,9 +30,7 @@ def write_lines_page(folder: str | Path, title: str, curves: Curves, unit: str |
     labels = _labels(curves)
     parts = [f"<h1>Lines of {html.escape(title)}</h1>"]
     lengths = html.escape(unit or "the unit of the cloud")
-    told = (
-        f"Lengths in {lengths}, angles in degrees, with standard deviations. What found no room for a label stands in "
-    )
+    told = f"Lengths in {lengths}, angles in degrees, with standard deviations. What has no label stands in "
     told += "the table."
     parts.append(f"<p>{html.escape(repr(curves))}. {told}</p>")
     for view, axes in VIEWS.items():
