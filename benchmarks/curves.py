@@ -85,8 +85,12 @@ def run(data: Path, *, quick: bool = False) -> list[dict[str, Any]]:
 def score(solid: synth.Solid, noise: float, seed: int) -> dict[str, Any]:
     """Sample a part, find its curves, and compare."""
     scene = synth.sample(solid, pattern="blue_noise", spacing=solid.spacing, noise=noise, seed=seed)
+    return compare(solid, scene, edgel.detect(scene.cloud, min_strength=FAINT), noise, seed)
+
+
+def compare(solid: synth.Solid, scene: synth.Scene, edges: edgel.Edges, noise: float, seed: int) -> dict[str, Any]:
+    """Find the curves of a sample, and compare them with the part's."""
     h = scene.spacing
-    edges = edgel.detect(scene.cloud, min_strength=FAINT)
     start = time.process_time()
     curves = trace(scene.cloud, edges)
     seconds = time.process_time() - start

@@ -4,7 +4,7 @@ import numpy as np
 from hall import TIMEOUT
 
 from edgel import EdgeKind
-from edgel._viewer.pick import Picked, describe, find, pick, row_of
+from edgel._viewer.pick import Picked, curve_of, curve_places, describe, describe_curve, find, pick, row_of
 from edgel._viewer.settings import Settings
 
 
@@ -46,3 +46,36 @@ def test_numbers_of_an_edge_point(open_session, hall_file):
     assert numbers["angle"] == f"{np.degrees(pane.edges.angle[crease]):.1f}°"
     boundary = int(np.flatnonzero(pane.edges.kind == EdgeKind.BOUNDARY)[0])
     assert describe(pane, boundary)["other face's normal"] == "unknown"
+
+
+def test_a_click_on_a_curve_tells_its_measures(open_session, hall_file):
+    session = open_session([hall_file])
+    session.settings = Settings(curves=True)
+    assert session.wait_idle(TIMEOUT)
+    (pane,) = session.panes()
+    assert pane.curves is not None
+    assert pane.edges is not None
+    assert session.panes(Settings())[0].curves is None
+    longest = int(pane.curves.length.argmax())
+    told = describe_curve(pane.curves, longest)
+    assert told["curve"] == f"line {longest + 1}"
+    assert told["its length"].startswith(f"{pane.curves.length[longest]:.5g} ± ")
+    assert pane.answer is not None
+    assert pane.answer.edges is not None
+    row = pane.answer.edges.index[pane.curves.rows_of(longest)[0]]
+    edge = int(np.flatnonzero(pane.edges.index == row)[0])
+    assert curve_of(pane, edge) == longest
+    assert describe(pane, edge)["its length"] == told["its length"]
+
+
+def test_places_along_curves_are_close(open_session, hall_file):
+    session = open_session([hall_file])
+    session.settings = Settings(curves=True)
+    assert session.wait_idle(TIMEOUT)
+    curves = session.panes()[0].curves
+    assert curves is not None
+    places, of = curve_places(curves, 0.5)
+    for curve in range(len(curves)):
+        steps = np.linalg.norm(np.diff(places[of == curve], axis=0), axis=1)
+        assert (steps <= 0.5 + 1e-9).all()
+        assert abs(len(steps) * 0.5 - curves.length[curve]) < 0.5 * len(curves.points_of(curve)) + 0.5 * len(steps)

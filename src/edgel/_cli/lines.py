@@ -12,23 +12,26 @@ import numpy as np
 
 from edgel._cli import files, jobs, options
 from edgel._cli.batch import Talk, run_jobs
-from edgel._cli.errors import ExitCode, Failure, exit_codes, failing_as
+from edgel._cli.errors import ExitCode, Failure, as_option, exit_codes, failing_as
 from edgel._cli.jobs import Job
-from edgel._cli.methods import check_options, find_edges
+from edgel._cli.methods import Found, check_options, find_edges
 from edgel._cli.outcome import Told, cautions, notices
 from edgel._cli.output import count, time_rows
 from edgel._cli.units import unit_of
 from edgel._cli.where import Where
 from edgel._report.lines import write_lines_page
 from edgel._stages import Stages
-from edgel.curves import FAINT, WRITERS, CurveKind, Curves, measures, simplify, trace, write
+from edgel.curves import FAINT, WRITERS, CurveKind, Curves, measures, right_angles, simplify, trace, write
+from edgel.tiled import is_run, surroundings
 
 HELP = """Draw the edges of clouds as lines, arcs and circles, measured on the faces beside them.
 
 The extension of -o says what is written: [bold].dxf[/bold] (LINE, ARC, CIRCLE, 3D POLYLINE; a layer for each kind of
 edge), [bold].gpkg .geojson .shp[/bold] (lines with Z and their measures, in the CRS of the cloud), [bold].svg[/bold] (a
 drawing to scale), [bold].obj .ply[/bold] (line elements), [bold].csv[/bold] (lengths, diameters, angles and their
-standard deviations). Lengths are in the cloud's unit. DXF and maps need the extra lines: pip install 'edgel\\[lines]'.
+standard deviations). Lengths are in the cloud's unit. A folder that
+[bold]edgel detect --as-one --min-strength 0.15[/bold] wrote is one input, whatever its tiles. DXF and maps need the
+extra lines: pip install 'edgel\\[lines]'.
 
 \b
 Examples:
@@ -36,6 +39,8 @@ Examples:
   edgel lines scan.ply -o measures.csv --report report
   edgel lines scan.las -o ridges.gpkg --where "classification == 6"
   edgel lines scan.las -o breaklines.geojson --simplify 0.2
+  edgel lines scan.las -o walls.gpkg --kinds boundary --right-angles 8
+  edgel lines out/ -o breaklines.gpkg
   edgel lines scan.ply -o top.svg --view top --unit mm
 """
 _GROUP = "Drawing"
@@ -70,6 +75,16 @@ def lines(
             default="none is left out",
         ),
     ] = None,
+    square: Annotated[
+        float | None,
+        options.own(
+            "--right-angles",
+            text="Turn lines in plan by up to so many degrees, so that neighbours meet at right angles, as walls do.",
+            group=_GROUP,
+            metavar="DEGREES",
+            default="none is turned",
+        ),
+    ] = None,
     report: Annotated[
         str | None,
         options.own(
@@ -100,11 +115,17 @@ def lines(
         given = {"min_strength": FAINT} | options.given(kinds=kinds, viewpoint=viewpoint, min_strength=min_strength)
         if tolerance is not None and not tolerance >= 0:
             raise Failure(ExitCode.USAGE, f"--simplify: expected a length of 0 or more, got {tolerance:g}")
+        if square is not None and not 0 < square <= 45:
+            raise Failure(ExitCode.USAGE, f"--right-angles: expected degrees above 0 and up to 45, got {square:g}")
         condition = None if where is None else Where(where)
         drawing: dict[str, Any] = {"view": view, "unit": unit, "scale": scale}
         reading = files.Reading(intrinsics, columns, sample_mesh)
-        wanted = _Wanted(reading, condition, check_options("auto", given), tolerance, drawing)
-        todo = jobs.plan(sources, reading, output=output, known=list(WRITERS), report=report, clobber=clobber)
+        wanted = _Wanted(reading, condition, check_options("auto", given), tolerance, square, drawing)
+        if len(sources) == 1 and is_run(sources[0]):
+            _check_tiled(options.given(kinds=kinds, min_strength=min_strength, where=where, viewpoint=viewpoint))
+            todo = [Job(sources[0], output, report, no_clobber=clobber is False)]
+        else:
+            todo = jobs.plan(sources, reading, output=output, known=list(WRITERS), report=report, clobber=clobber)
         run_jobs(todo, partial(_draw, wanted), Talk("lines", as_json, quiet, debug), workers=workers)
 
 
@@ -116,6 +137,7 @@ class _Wanted:
     where: Where | None
     given: dict[str, Any]
     tolerance: float | None
+    square: float | None
     drawing: dict[str, Any]
 
 
@@ -124,11 +146,17 @@ def _draw(wanted: _Wanted, job: Job, progress: Callable[[str], None]) -> Told:
     files.check_extension(output, list(WRITERS))
     files.check_file(output, no_clobber=job.no_clobber, among=job.among)
     files.check_not_input(output, [job.source, wanted.reading.intrinsics])
-    files.check_input(job.source, wanted.reading)
     stages = Stages(progress)
-    found = find_edges(job.source, wanted.reading, wanted.where, "auto", wanted.given, stages)
+    if is_run(job.source):
+        with stages("reading"), failing_as(ExitCode.DATA, job.source):
+            cloud, edges = surroundings(job.source)
+        found = Found(cloud, cloud, edges)
+    else:
+        files.check_input(job.source, wanted.reading)
+        found = find_edges(job.source, wanted.reading, wanted.where, "auto", wanted.given, stages)
     with stages("lines"), failing_as(ExitCode.DATA, job.source, wanted.given):
         curves = replace(trace(found.seen, found.edges), crs=found.cloud.crs)
+        curves = curves if wanted.square is None else right_angles(curves, np.radians(wanted.square))
         curves = curves if wanted.tolerance is None else simplify(curves, wanted.tolerance)
     with stages("writing"), failing_as(ExitCode.OUTPUT, output):
         jobs.make_folder(job)
@@ -156,6 +184,12 @@ def _draw(wanted: _Wanted, job: Job, progress: Callable[[str], None]) -> Told:
         remarks=[*cautions(job, found.cloud, {}), *nothing],
         written=[f"{output}: {count(len(curves))} curves", *([] if page is None else [f"{page}: the report"])],
     )
+
+
+def _check_tiled(given: dict[str, Any]) -> None:
+    """Raise a `Failure` for options that say how edges are found, where they have been found already."""
+    for name in given:
+        raise Failure(ExitCode.USAGE, f"{as_option(name)}: is for edges that are yet to be found; leave it out here")
 
 
 def _write(output: str, curves: Curves, drawing: dict[str, Any]) -> None:

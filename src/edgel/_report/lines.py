@@ -12,7 +12,7 @@ from edgel.curves._svg import VIEWS, drawing
 from edgel.io.files import replacing
 
 _WIDE = 240.0  # millimetres
-_LABELLED = 60  # curves: more labels cover each other, the longest and the circles have theirs
+_LABELLED = 60  # of the longest curves, beside the circles
 _COLUMNS = ("name", "edge", "length", "length_std", "diameter", "diameter_std", "angle", "angle_std", "position_std")
 _STYLE = (
     "body{font:15px/1.5 system-ui,sans-serif;max-width:1000px;margin:2em auto;padding:0 1em}"
@@ -30,7 +30,8 @@ def write_lines_page(folder: str | Path, title: str, curves: Curves, unit: str |
     labels = _labels(curves)
     parts = [f"<h1>Lines of {html.escape(title)}</h1>"]
     lengths = html.escape(unit or "the unit of the cloud")
-    told = f"Lengths in {lengths}, angles in degrees, with standard deviations."
+    told = f"Lengths in {lengths}, angles in degrees, with standard deviations. What has no label stands in "
+    told += "the table."
     parts.append(f"<p>{html.escape(repr(curves))}. {told}</p>")
     for view, axes in VIEWS.items():
         factor = _WIDE / max(float(extent[list(axes)].max()), 1e-300)

@@ -16,6 +16,7 @@ from edgel._viewer.runs import LEAST_STRENGTH
 from edgel._viewer.session import Pane
 from edgel._viewer.settings import Settings
 from edgel._viewer.source import Drawn
+from edgel.curves import CurveKind, Curves
 from edgel.edges import Edges
 
 _POINT = 1.5  # side of a point of the cloud, a square, in spacings: no holes, and little drawn twice
@@ -29,6 +30,12 @@ _NORMAL, _TANGENT = 0.06, 0.05  # lengths of segments, scene units
 _LIFT = 0.012  # scene units from the surface to the tangents, which the edge points would hide
 _CELL = 0.03  # at most one segment a cell of this size, scene units
 _TANGENT_COLOR, _NORMAL_COLORS = (0, 150, 50), ((40, 40, 40), (190, 120, 20))
+_CURVE_COLORS = {
+    CurveKind.LINE: (31, 78, 158),
+    CurveKind.ARC: (26, 138, 74),
+    CurveKind.CIRCLE: (176, 42, 143),
+    CurveKind.POLYLINE: (208, 64, 42),
+}
 _STILL = 0.01  # scene units: a camera that was not moved by more was not moved by the user
 _ABOVE = 0.12  # scene units from a cloud to its name
 _MARK_COLOR = (255, 220, 0)
@@ -62,6 +69,7 @@ class Canvas:
             for number, (pane, placement) in enumerate(zip(panes, self.layout.placements, strict=True)):
                 self._draw_cloud(number, pane, placement, settings)
                 shown.append(self._draw_edges(number, pane, placement, settings))
+                self._draw_curves(number, pane.curves, placement)
                 if len(panes) > 1:
                     self._label(f"/label{number}", pane.name, placement)
         self.shown = shown
@@ -140,6 +148,22 @@ class Canvas:
         for what in ("tangents", "normals"):
             self._segments(f"/{what}{number}", segments.get(what))
         return points
+
+    def _draw_curves(self, number: int, curves: Curves | None, placement: Placement) -> None:
+        name = f"/curves{number}"
+        if name in self._drawn and self._drawn[name] is curves:
+            return
+        self._drawn[name] = curves
+        if curves is None:
+            self._segments(name, None)
+            return
+        inner = np.ones(len(curves.vertices), bool)
+        inner[curves.start[1:] - 1] = False
+        first = np.flatnonzero(inner)
+        places = placement.to_scene(curves.vertices)
+        kinds = np.repeat(curves.kind, np.diff(curves.start))[first]
+        colors = np.array([_CURVE_COLORS[CurveKind(kind)] for kind in kinds], np.uint8).reshape(-1, 1, 3)
+        self._segments(name, (np.stack([places[first], places[first + 1]], axis=1), np.repeat(colors, 2, axis=1)))
 
     def _points(self, name: str, points: np.ndarray, colors: np.ndarray, size: float) -> None:
         node = self._nodes.get(name)

@@ -56,6 +56,9 @@ class Controls:
             self.edge_colors = gui.add_dropdown("Color edges by", _EDGE_COLORS)
             self.tangents = gui.add_checkbox("Tangents", False, hint="Green segments along the edge")
             self.normals = gui.add_checkbox("Normals", False, hint="Segments: grey one face's, ochre the other's")
+            self.curves = gui.add_checkbox(
+                "Curves", False, hint="Lines, arcs and circles along the edges; click an edge point for their measures"
+            )
             self.every_point = gui.add_checkbox(
                 "Every point", False, hint="Draw all points of the cloud, which without a graphics card takes its time"
             )
@@ -96,6 +99,7 @@ class Controls:
             by_strength=self.edge_colors.value == "strength",
             tangents=self.tangents.value,
             normals=self.normals.value,
+            curves=self.curves.value,
             every_point=self.every_point.value,
             size=self.size.value,
         )
@@ -125,7 +129,7 @@ class Controls:
     def _settings_handles(self) -> list[Any]:
         return [
             *(self.method, self.strength, self.angle, self.scale, self.coloring, self.edge_colors),
-            *(self.tangents, self.normals, self.every_point, self.size),
+            *(self.tangents, self.normals, self.curves, self.every_point, self.size),
             *self.kinds.values(),
             *self.crop,
         ]

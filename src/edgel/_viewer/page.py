@@ -15,13 +15,14 @@ from edgel._viewer.colors import colorings
 from edgel._viewer.commands import command_line, python_lines
 from edgel._viewer.controls import Controls
 from edgel._viewer.latest import Latest
-from edgel._viewer.pick import Picked, Row, describe, find, pick, row_of
+from edgel._viewer.pick import Picked, Row, curve_places, describe, describe_curve, find, pick, row_of
 from edgel._viewer.save import edges_file, picture_file, png
 from edgel._viewer.session import Pane, Session
 from edgel.io.errors import describe_error, printable
 from edgel.paper import PaperEdges
 
 _HEAD_START = 0.005  # seconds in which the texts leave before the scene
+_CURVE_STEP = 0.005  # scene units between the places of a curve that can be clicked
 _CLICK = 8  # pixels that a click may miss an edge point by
 
 
@@ -122,6 +123,27 @@ class Page:
         ray = np.array(event.ray_origin), np.array(event.ray_direction)
         picked = pick(shown, *ray, max_angle=float(reach), radius=max(sizes, default=0.0))
         self._pick(picked)
+        if picked is None:
+            self._pick_curve(ray, float(reach))
+
+    def _pick_curve(self, ray: tuple[np.ndarray, np.ndarray], reach: float) -> None:
+        """Show the measures of a curve that was clicked where it has no edge point."""
+        layout, panes = self._canvas.layout, self._panes
+        if layout is None:
+            return
+        none = np.empty((0, 3)), np.empty(0, np.int64)
+        found = [
+            none if pane.curves is None else curve_places(pane.curves, _CURVE_STEP / placement.unit)
+            for pane, placement in zip(panes, layout.placements, strict=True)
+        ]
+        scene = [at.to_scene(places) for (places, _), at in zip(found, layout.placements, strict=True)]
+        picked = pick(scene, *ray, max_angle=reach)
+        if picked is not None:
+            curves = panes[picked.pane].curves
+            assert curves is not None
+            self._controls.numbers.content = texts.numbers(
+                describe_curve(curves, int(found[picked.pane][1][picked.edge]))
+            )
 
     def _pick(self, picked: Picked | None) -> None:
         """Mark an edge point and show its numbers, or none."""

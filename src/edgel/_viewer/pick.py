@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from edgel._viewer.session import Pane
+from edgel.curves import Curves, measures
 from edgel.edges import EdgeKind, kind_names
 
 _SAME_DEPTH = 0.03  # scene units: edge points that near behind the nearest one may be meant as well
@@ -94,13 +95,49 @@ def find(panes: Sequence[Pane], row: Row) -> Picked | None:
     return None
 
 
+def curve_places(curves: Curves, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return places along curves (P, 3), no farther than a step from each other, and the curve of each (P,)."""
+    inner = np.ones(len(curves.vertices), bool)
+    inner[curves.start[1:] - 1] = False
+    first = np.flatnonzero(inner)
+    way = curves.vertices[first + 1] - curves.vertices[first]
+    number = np.maximum(np.ceil(np.linalg.norm(way, axis=1) / step), 1).astype(np.int64)
+    segment = np.repeat(np.arange(len(first)), number)
+    at = (np.arange(len(segment)) - np.repeat(np.cumsum(number) - number, number) + 0.5) / number[segment]
+    curve = np.repeat(np.arange(len(curves)), np.diff(curves.start))[first]
+    return curves.vertices[first[segment]] + at[:, None] * way[segment], curve[segment]
+
+
+def curve_of(pane: Pane, edge: int) -> int | None:
+    """Return the curve on which an edge point of a pane lies, None where there is none."""
+    if pane.curves is None or pane.edges is None or pane.answer is None or pane.answer.edges is None:
+        return None
+    at = np.flatnonzero(pane.answer.edges.index[pane.curves.rows] == pane.edges.index[edge])
+    return None if not len(at) else int(np.searchsorted(pane.curves.row_start, at[0], side="right")) - 1
+
+
+def describe_curve(curves: Curves, curve: int) -> dict[str, str]:
+    """Put into words what is measured of a curve."""
+    table = {name: column[curve] for name, column in measures(curves).items()}
+    words = {"curve": str(table["name"])}
+    for name, unit in (("length", ""), ("diameter", ""), ("angle", "°")):
+        if np.isfinite(table[name]):
+            std = table[f"{name}_std"]
+            words[f"its {name}"] = f"{table[name]:.5g}{unit}" + (f" ± {std:.2g}{unit}" if np.isfinite(std) else "")
+    if np.isfinite(table["position_std"]):
+        words["its place"] = f"± {table['position_std']:.2g} across"
+    return words
+
+
 def describe(pane: Pane, edge: int) -> dict[str, str]:
     """Put into words what is known of an edge point of a pane, by its number among those shown."""
     assert pane.edges is not None
     edges = pane.edges
     row = int(edges.index[edge])
+    curve = curve_of(pane, edge)
+    on = {} if curve is None or pane.curves is None else describe_curve(pane.curves, curve)
     bend = {1: "convex, like the edge of a cube", -1: "concave, like the edge of a hole"}
-    return {
+    return on | {
         "file": pane.source.name,
         "row": f"{row:,} (counted from 0)",
         "kind": ", ".join(kind_names(EdgeKind(int(edges.kind[edge])))),

@@ -19,6 +19,7 @@ from edgel._viewer.select import select
 from edgel._viewer.settings import Settings
 from edgel._viewer.source import Source
 from edgel.cloud import Cloud
+from edgel.curves import Curves, trace
 from edgel.edges import Edges
 from edgel.io.errors import describe_error, printable
 
@@ -59,6 +60,7 @@ class Pane:
     edges: Edges | None
     box: np.ndarray
     is_current: bool
+    curves: Curves | None = None
 
 
 class Superseded(Exception):  # noqa: N818 - no error, a run that nobody waits for any more
@@ -96,6 +98,7 @@ class Session:
         self._changed: Callable[[], None] = lambda: None
         self._detect = detect
         self._answers: dict[Run, Answer] = {}
+        self._curves: dict[Answer, Curves] = {}
         self._last: dict[tuple[int, Method], Run] = {}
         self._selected: dict[tuple[int, Method], tuple[Any, Edges]] = {}
         self._closed = False
@@ -148,7 +151,8 @@ class Session:
         name = source.name
         if len(settings.methods) > 1:
             name += f" · {method}"
-        return Pane(name, source, source.cloud, method, run, answer, edges, box, run == wanted)
+        curves = self._curves.get(answer) if answer is not None and settings.curves else None
+        return Pane(name, source, source.cloud, method, run, answer, edges, box, run == wanted, curves)
 
     def _select(self, number: int, method: Method, answer: Answer, settings: Settings) -> Edges:
         """Return the edges of an answer that the settings show, the same object for as long as they are the same."""
@@ -182,7 +186,24 @@ class Session:
                 source.estimate_normals()
         while not self._closed and (missing := [run for run in self._wanted() if run not in self._answers]):
             self._answer(missing[0])
+        while not self._closed and (untraced := self._untraced()):
+            self._trace(*untraced[0])
         self._say("")
+
+    def _untraced(self) -> list[tuple[Source, Answer]]:
+        """Return the answers whose curves are asked for and not there yet."""
+        if not self._settings.curves:
+            return []
+        found = [(self.sources[run.source], self._answers[run]) for run in self._wanted() if run.method == "edgel"]
+        return [(source, answer) for source, answer in found if answer.edges is not None and answer not in self._curves]
+
+    def _trace(self, source: Source, answer: Answer) -> None:
+        self._say(f"tracing curves in {source.name}")
+        assert source.cloud is not None
+        assert answer.edges is not None
+        kept = {old: curves for old, curves in self._curves.items() if old in self._answers.values()}
+        self._curves = {**kept, answer: trace(source.cloud, answer.edges)}
+        self._changed()
 
     def _answer(self, run: Run) -> None:
         """Run the detector and keep what comes of it."""

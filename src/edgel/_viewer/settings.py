@@ -49,6 +49,8 @@ class Settings:
         Whether edges are colored by strength, else by kind.
     tangents, normals : bool
         Whether they are drawn as segments.
+    curves : bool
+        Whether curves are traced and drawn.
     every_point : bool
         Whether all points of the cloud are drawn, however many, else an evenly sampled part of them.
     size : float
@@ -65,6 +67,7 @@ class Settings:
     by_strength: bool = False
     tangents: bool = False
     normals: bool = False
+    curves: bool = False
     every_point: bool = False
     size: float = 1.0
 

@@ -3,6 +3,7 @@
 from edgel.curves._curves import CurveKind, Curves
 from edgel.curves._files import WRITERS, write
 from edgel.curves._measures import COLUMNS, Parallels, measures, parallels
+from edgel.curves._right_angles import right_angles
 from edgel.curves._simplify import simplify
 from edgel.curves._trace import FAINT, trace
 
@@ -15,6 +16,7 @@ __all__ = [
     "Parallels",
     "measures",
     "parallels",
+    "right_angles",
     "simplify",
     "trace",
     "write",

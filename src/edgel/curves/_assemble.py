@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from edgel.curves import _fit, _rims
+from edgel.curves import _fit
 from edgel.curves._circle import RADIUS
-from edgel.curves._corners import Nodes, meet
+from edgel.curves._corners import Nodes, meet, without_unsure
 from edgel.curves._curves import CurveKind, Curves
 from edgel.curves._gather import on_shapes
 from edgel.curves._loops import find_loops
+from edgel.curves._measure import noise_of
 from edgel.curves._points import EdgePoints
 from edgel.curves._strands import Strands, along_of_all, ends_of, past
 from edgel.curves._tangent import touch
@@ -29,6 +30,7 @@ _ORDER = (EdgeKind.CREASE, EdgeKind.BOUNDARY, EdgeKind.OCCLUDING, EdgeKind.COLOR
 def assemble(strands: Strands, points: EdgePoints, edges: Edges, origin: np.ndarray, crs: str | None) -> Curves:
     """Make curves of strands."""
     nodes = touch(strands, meet(ends_of(strands), strands.shape, strands.spacing))
+    nodes = without_unsure(nodes, points.position, noise_of(strands, strands.spacing), strands.spacing)
     nodes, through = meet_through(strands, nodes)
     strands = end_at_nodes(strands, nodes)
     kept = np.flatnonzero(_long_enough(strands, nodes))
@@ -43,8 +45,7 @@ def assemble(strands: Strands, points: EdgePoints, edges: Edges, origin: np.ndar
     loop, is_hole = find_loops(strands, nodes, vertices, start, edge, points)
     radius = np.where(kinds >= CurveKind.ARC, strands.shape[:, RADIUS], np.nan)
     radius[kinds == CurveKind.POLYLINE] = np.nan
-    paths = np.split(vertices, start[1:-1]) if len(strands) else []
-    length = np.array([np.linalg.norm(np.diff(path, axis=0), axis=1).sum() for path in paths], float)
+    length = _lengths(vertices, start)
     is_arc = np.isfinite(radius)
     length[is_arc] = (strands.along[:, 1] - strands.along[:, 0])[is_arc]
     return Curves(
@@ -110,7 +111,7 @@ def _held(
     rho = np.hypot(x, y)
     miss = np.stack([rho - shape[:, RADIUS], z], axis=1)
     # How both change with tilt, centre, radius and height.
-    change = np.zeros((len(shape), 2, _rims.UNKNOWNS))
+    change = np.zeros((len(shape), 2, _fit.UNKNOWNS))
     u, v = x / rho, y / rho
     change[:, 0, 0], change[:, 0, 1] = u * z, v * z
     change[:, 0, 2], change[:, 0, 3], change[:, 0, 4] = u, v, 1.0
@@ -162,32 +163,35 @@ def _kinds_of(strands: Strands) -> np.ndarray:
 
 def _vertices(strands: Strands, nodes: Nodes) -> tuple[np.ndarray, np.ndarray]:
     """Return the places along all strands, and where each strand's begin."""
-    paths = []
-    for k in range(len(strands)):
-        ends = [nodes.position[n] if n >= 0 else None for n in nodes.of_end[k]]
-        radius = strands.shape[k, RADIUS]
-        if np.isnan(radius):
-            path = strands.path_of(k)
-            path = np.concatenate([path, path[:1]]) if strands.closed[k] else path
-        else:
-            low, high = strands.along[k]
-            steps = 1
-            if radius > 0:
-                turn = 2 * np.arccos(max(1 - _CHORD * strands.spacing[k] / radius, 0.5))
-                steps = max(int(np.ceil((high - low) / radius / turn)), 2)
-            along = np.linspace(low, high, steps + 1)
-            path = on_shapes(np.repeat(strands.shape[k : k + 1], steps + 1, axis=0), along)
-            if strands.closed[k]:
-                path[-1] = path[0]
-        # Lines run from node to node; arcs were fitted again to pass through theirs, and are not bent.
-        is_line = radius == 0
-        if ends[0] is not None and not radius > 0:
-            path = np.concatenate([ends[0][None], path[1 if is_line else 0 :]])
-        if ends[1] is not None and not radius > 0:
-            path = np.concatenate([path[: -1 if is_line else None], ends[1][None]])
-        paths.append(path)
-    start = np.concatenate([[0], np.cumsum([len(path) for path in paths])]).astype(np.int64)
-    return np.concatenate(paths) if paths else np.empty((0, 3)), start
+    is_run, radius = strands.is_run, np.nan_to_num(strands.shape[:, RADIUS])
+    low, span = strands.along[:, 0], strands.along[:, 1] - strands.along[:, 0]
+    meets = nodes.of_end >= 0
+    curved = radius > 0
+    round_ = np.where(curved, radius, 1.0)
+    turn = 2 * np.arccos(np.maximum(1 - _CHORD * strands.spacing / round_, 0.5))
+    steps = np.where(curved, np.maximum(np.ceil(span / round_ / turn), 2), 1).astype(np.int64)
+    counts = np.where(is_run, np.diff(strands.rows[1]) + strands.closed + meets.sum(axis=1), steps + 1)
+    start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+    owner = np.repeat(np.arange(len(strands)), counts)
+    at = (np.arange(len(owner)) - start[owner]) / steps[owner]
+    vertices = on_shapes(strands.shape[owner], low[owner] + at * span[owner])
+    vertices[start[1:][strands.closed] - 1] = vertices[start[:-1][strands.closed]]
+    for run in np.flatnonzero(is_run):
+        path = strands.path_of(run)
+        before, after = (nodes.position[nodes.of_end[run, end : end + 1][meets[run, end : end + 1]]] for end in (0, 1))
+        vertices[start[run] : start[run + 1]] = np.concatenate([before, path, path[: int(strands.closed[run])], after])
+    # Lines run from node to node; arcs were fitted again to pass through theirs, and are not bent.
+    for end, place in ((0, start[:-1]), (1, start[1:] - 1)):
+        lines = meets[:, end] & ~is_run & ~curved
+        vertices[place[lines]] = nodes.position[nodes.of_end[lines, end]]
+    return vertices, start
+
+
+def _lengths(vertices: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """Return the lengths of paths, given where each begins among all places."""
+    step = np.linalg.norm(np.diff(vertices, axis=0, append=vertices[-1:]), axis=1)
+    step[start[1:] - 1] = 0.0
+    return np.add.reduceat(step, start[:-1]) if len(step) else np.empty(0)
 
 
 def _directions(strands: Strands, vertices: np.ndarray, start: np.ndarray, kinds: np.ndarray) -> np.ndarray:

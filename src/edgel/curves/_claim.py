@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from edgel._kernels.parallel import kernel, routine
 from edgel.curves._circle import offset_of, tangent_of
 from edgel.curves._smooth import Smoothed
 
-ASIDE = 0.7
+ASIDE = 1.2
 """Spacings: farther from a shape lies no edge point of it."""
 _ALIKE = 0.7  # cosine between the tangent of an edge point and that of the shape
 _OWN = 0.5  # of a shape's points: with more of them on a surer one it is no shape of its own
 _FEWEST = 3
+_DEVIATIONS, _NEAR = 4.0, 0.3  # of its own points, and spacings: a shape takes others so far from it
 
 
 def claim(
@@ -39,8 +42,12 @@ def _flood(order, shapes, rows, first, position, tangent, neighbors, spacing, ow
         shape = shapes[k]
         own = rows[first[k] : first[k + 1]]
         height = 0
+        square = 0.0
         for i in own:
-            if owner[i] < 0 and _belongs(shape, i, position, tangent, spacing, 1.3):
+            square += (offset_of(shape, position[i, 0], position[i, 1], position[i, 2]) / spacing[i]) ** 2
+        near = min(max(_DEVIATIONS * math.sqrt(square / len(own)), _NEAR), ASIDE)
+        for i in own:
+            if owner[i] < 0 and _belongs(shape, i, position, tangent, spacing, 1.3 * ASIDE):
                 stack[height] = i
                 height += 1
         if height < max(_FEWEST, _OWN * len(own)):
@@ -50,7 +57,7 @@ def _flood(order, shapes, rows, first, position, tangent, neighbors, spacing, ow
         while height > 0:
             height -= 1
             for j in neighbors[stack[height]]:
-                if owner[j] < 0 and _belongs(shape, j, position, tangent, spacing, 1.0):
+                if owner[j] < 0 and _belongs(shape, j, position, tangent, spacing, near):
                     owner[j] = k
                     stack[height] = j
                     height += 1
@@ -59,7 +66,7 @@ def _flood(order, shapes, rows, first, position, tangent, neighbors, spacing, ow
 @routine
 def _belongs(shape, i, position, tangent, spacing, margin):
     x, y, z = position[i, 0], position[i, 1], position[i, 2]
-    if offset_of(shape, x, y, z) > margin * ASIDE * spacing[i]:
+    if offset_of(shape, x, y, z) > margin * spacing[i]:
         return False
     u, v, w = tangent_of(shape, x, y, z)
     return abs(u * tangent[i, 0] + v * tangent[i, 1] + w * tangent[i, 2]) > _ALIKE

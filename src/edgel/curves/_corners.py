@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from edgel._kernels.parallel import kernel, routine
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import knn
-from edgel.curves._circle import RADIUS, offset_of
+from edgel.curves._circle import RADIUS, offset_of, tangent_of
 
 REACH = 3.5
 """Spacings: so far from where its points end a curve meets others."""
@@ -18,6 +18,9 @@ _ASIDE = 0.7  # spacings: farther from a curve lies no corner of it, unless the 
 _MOST = 8  # ends near each that are tried
 PRIOR = 3.0  # spacings: standard deviation of a corner about the ends, where no face decides
 _FLOOR = 0.02  # spacings: no face is surer
+_UNSURE, _BY_NOISE, _LONE, _NOISY = 0.4, 0.8, 0.9, 0.2
+"""Spacings: corners of two curves that are less sure, what noise adds to that, how far edge points may be;
+and the noise from which on neither tells right from wrong."""
 CORNER = math.cos(math.radians(20.0))  # between tangents: nearer to straight the joint is smooth
 
 
@@ -93,6 +96,26 @@ def meet(ends: Ends, shapes: np.ndarray, spacing: np.ndarray) -> Nodes:
     return Nodes(position[:found], std[:found], is_corner[:found], of_end)
 
 
+def without_unsure(nodes: Nodes, position: np.ndarray, noise: float, spacing: np.ndarray) -> Nodes:
+    """Leave out nodes of two curves whose place is unsure, or where no edge point (E, 3) is.
+
+    A corner of faces has three curves; where there are two, a fillet may run past it, or a curve may just end. Takes
+    the noise in spacings and the spacing (N,) of the curves.
+    """
+    count = len(nodes.position)
+    if not count or noise > _NOISY:
+        return nodes
+    ending = nodes.of_end[nodes.of_end >= 0]
+    uses = np.bincount(ending, minlength=count)
+    h = np.bincount(ending, np.repeat(spacing, 2)[nodes.of_end.ravel() >= 0], count) / np.maximum(uses, 1)
+    far = knn(build_index(position), nodes.position, 1).distances[:, 0]
+    unsure = nodes.std > (_UNSURE + _BY_NOISE * noise) * h
+    lone = far > (_LONE + _BY_NOISE * noise) * h
+    out = nodes.is_corner & (uses == 2) & (unsure | lone)
+    of_end = np.where((nodes.of_end >= 0) & out[nodes.of_end], -1, nodes.of_end)
+    return replace(nodes, of_end=of_end)
+
+
 def _equations(ends: Ends, flat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the normal equations of the planes of each end."""
     normals, std = ends.normals.reshape(-1, 2, 3)[flat], ends.std.reshape(-1, 2)[flat]
@@ -108,7 +131,10 @@ def _join(a, b, ring, places, tangents, squares, rights, curve, shapes, spacing)
     for pair in range(len(a)):
         one, two = a[pair], b[pair]
         count = _members(one, ring, members)
-        if (members[:count] == two).any():
+        together = False
+        for q in range(count):
+            together |= members[q] == two
+        if together:
             continue
         ring[one], ring[two] = ring[two], ring[one]
         if not _agrees(one, ring, places, tangents, squares, rights, curve, shapes, spacing):
@@ -130,24 +156,24 @@ def _members(end, ring, members):
 @routine
 def _solve(members, count, places, squares, rights, spacing, curve, position):
     """Write where the planes of some ends meet, and return the standard deviation of that place."""
-    matrix, side, mean = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
-    h = 0.0
+    h = xx = xy = xz = yy = yz = zz = x = y = z = 0.0
+    for q in range(count):
+        h += spacing[curve[members[q]]] / count
+    prior = 1.0 / (PRIOR * h) ** 2
     for q in range(count):
         i = members[q]
-        matrix += squares[i]
-        side += rights[i]
-        mean += places[i] / count
-        h += spacing[curve[i]] / count
-    prior = 1.0 / (PRIOR * h) ** 2
-    for axis in range(3):
-        matrix[axis, axis] += prior
-        side[axis] += prior * mean[axis]
-    inverse = np.linalg.inv(matrix)
-    for axis in range(3):
-        position[axis] = 0.0
-        for other in range(3):
-            position[axis] += inverse[axis, other] * side[other]
-    return math.sqrt(inverse[0, 0] + inverse[1, 1] + inverse[2, 2])
+        xx, xy, xz = xx + squares[i, 0, 0], xy + squares[i, 0, 1], xz + squares[i, 0, 2]
+        yy, yz, zz = yy + squares[i, 1, 1], yz + squares[i, 1, 2], zz + squares[i, 2, 2]
+        x, y = x + rights[i, 0] + prior * places[i, 0] / count, y + rights[i, 1] + prior * places[i, 1] / count
+        z += rights[i, 2] + prior * places[i, 2] / count
+    xx, yy, zz = xx + prior, yy + prior, zz + prior
+    # Cofactors of the symmetric matrix, over its determinant.
+    a, b, c = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
+    d, e, f = xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy
+    det = xx * a + xy * b + xz * c
+    position[0], position[1] = (a * x + b * y + c * z) / det, (b * x + d * y + e * z) / det
+    position[2] = (c * x + e * y + f * z) / det
+    return math.sqrt((a + d + f) / det)
 
 
 @routine
@@ -165,9 +191,9 @@ def _agrees(end, ring, places, tangents, squares, rights, curve, shapes, spacing
     for q in range(count):
         i = members[q]
         h = spacing[curve[i]]
-        d = position - places[i]
-        along = d[0] * tangents[i, 0] + d[1] * tangents[i, 1] + d[2] * tangents[i, 2]
-        square = d[0] ** 2 + d[1] ** 2 + d[2] ** 2
+        x, y, z = position[0] - places[i, 0], position[1] - places[i, 1], position[2] - places[i, 2]
+        along = x * tangents[i, 0] + y * tangents[i, 1] + z * tangents[i, 2]
+        square = x * x + y * y + z * z
         if math.sqrt(square) > REACH * h:
             return False
         if math.isfinite(shapes[curve[i], RADIUS]):
@@ -183,22 +209,24 @@ def _agrees(end, ring, places, tangents, squares, rights, curve, shapes, spacing
 def _settle(ring, number, places, tangents, squares, rights, curve, shapes, spacing, position, std, is_corner):
     """Number the groups of several ends, write what each is, and return how many there are."""
     found = 0
-    members = np.empty(2 * _MOST, np.int64)
+    members, ways = np.empty(2 * _MOST, np.int64), np.empty((2 * _MOST, 3))
     number[:] = -1
     for end in range(len(ring)):
         count = _members(end, ring, members)
         if count < 2 or number[end] >= 0:
             continue
-        std[found] = _solve(members, count, places, squares, rights, spacing, curve, position[found])
+        node = position[found]
+        std[found] = _solve(members, count, places, squares, rights, spacing, curve, node)
         straight = 1.0
         for q in range(count):
-            number[members[q]] = found
+            i = members[q]
+            number[i] = found
+            x, y, z = tangents[i, 0], tangents[i, 1], tangents[i, 2]
+            if math.isfinite(shapes[curve[i], RADIUS]):  # an arc has turned on the way from its end to the node
+                x, y, z = tangent_of(shapes[curve[i]], node[0], node[1], node[2])
+            ways[q, 0], ways[q, 1], ways[q, 2] = x, y, z
             for r in range(q):
-                i, j = members[q], members[r]
-                cosine = abs(
-                    tangents[i, 0] * tangents[j, 0] + tangents[i, 1] * tangents[j, 1] + tangents[i, 2] * tangents[j, 2]
-                )
-                straight = min(straight, cosine)
+                straight = min(straight, abs(x * ways[r, 0] + y * ways[r, 1] + z * ways[r, 2]))
         is_corner[found] = straight < CORNER
         found += 1
     return found

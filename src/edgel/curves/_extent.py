@@ -7,15 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from edgel._kernels.parallel import kernel, routine, run_slices
+from edgel._neighbors.kdtree import NeighborIndex
 from edgel.curves import _fit
 from edgel.curves._circle import RADIUS, along_of
-from edgel.curves._gather import widened
+from edgel.curves._gather import gather, widened
 from edgel.curves._measure import Measured
 from edgel.curves._profile import in_profile
 
 _MOST = 12  # intervals of one shape
 _GAP = 2.0  # spacings without anything: a curve goes on beyond
 _DEPTH = 2.5  # spacings: so far into a face its points speak for it
+_FAR = 2.7  # spacings: farther from a curve lie none of those
+_ROOM = 4096  # points beside a shape that there is room for to begin with
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,24 +45,24 @@ class Extents:
 
 def extents(
     measured: Measured,
-    xyz: np.ndarray,
+    index: NeighborIndex,
     owned: tuple[np.ndarray, np.ndarray],
     position: np.ndarray,
     ranges: np.ndarray,
     spacing: np.ndarray,
+    share: float = 0.0,
 ) -> Extents:
     """Find where measured shapes are edges, in bins of a spacing.
 
     Takes the edge points that each owns (as rows of `position`, and where each shape's begin), and the ranges (K, 2)
-    in which they lie.
+    in which they lie; beyond these it looks 4 spacings far, and at least a share of their length.
     """
     shapes = measured.shape
     count = len(shapes)
-    low, high, whole = widened(shapes, ranges, spacing)
+    low, high, whole = widened(shapes, ranges, spacing, share)
     ends, closed = np.zeros((count, _MOST, 2)), np.zeros((count, _MOST), np.bool_)
     found, number = np.zeros((count, _MOST), np.int64), np.zeros(count, np.int64)
-    beside = measured.beside
-    arguments = (shapes, measured.fit, beside.points, beside.start, xyz, *owned, position, spacing, low, high, whole)
+    arguments = (shapes, measured.fit, index.xyz, index.boxes, *owned, position, spacing, low, high, whole)
     run_slices(_extents, count, *arguments, ends, closed, found, number, size=16)
     kept = np.arange(_MOST) < number[:, None]
     return Extents(np.repeat(np.arange(count), number), ends[kept], closed[kept], found[kept])
@@ -67,9 +70,10 @@ def extents(
 
 @kernel
 def _extents(
-    start, stop, shapes, fits, beside, begin, xyz, rows, first, position, spacing, low, high, whole,
+    start, stop, shapes, fits, places, boxes, rows, first, position, spacing, low, high, whole,
     ends, closed, found, number,
 ):  # fmt: skip
+    near = np.empty((_ROOM, 3))
     for k in range(start, stop):
         h, own = spacing[k], rows[first[k] : first[k + 1]]
         if len(own) == 0:
@@ -83,7 +87,11 @@ def _extents(
             if 0 <= b < bins:
                 edges[b] += 1
         if fits[k, _fit.STATE] == _fit.MEASURED:
-            _count_sides(shapes[k], fits[k], beside[begin[k] : begin[k + 1]], xyz, h, low[k], width, around, sides)
+            number_near = gather(places, boxes, shapes[k], low[k], high[k], _FAR * h, near)
+            if number_near > len(near):
+                near = np.empty((2 * number_near, 3))
+                gather(places, boxes, shapes[k], low[k], high[k], _FAR * h, near)
+            _count_sides(shapes[k], fits[k], near[:number_near], h, low[k], width, around, sides)
         speaks = (edges > 0) | ((sides[:, 0] > 0) & (sides[:, 1] > 0))
         _intervals(speaks, edges, h, low[k], width, whole[k], k, ends, closed, found, number)
 
@@ -96,10 +104,10 @@ def _bin(along, low, width, around):
 
 
 @routine
-def _count_sides(shape, fit, beside, xyz, h, low, width, around, sides):
+def _count_sides(shape, fit, beside, h, low, width, around, sides):
     """Count the points of either face in each bin along a shape, near the edge."""
-    for i in beside:
-        a, b, along = in_profile(shape, xyz[i, 0], xyz[i, 1], xyz[i, 2])
+    for i in range(len(beside)):
+        a, b, along = in_profile(shape, beside[i, 0], beside[i, 1], beside[i, 2])
         bin_ = _bin(along, low, width, around)
         if not 0 <= bin_ < len(sides):
             continue

@@ -1,63 +1,25 @@
-"""The points of the faces beside curves."""
+"""The points of the cloud beside curves."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel, run_slices
-from edgel._neighbors.kdtree import NeighborIndex
-from edgel._neighbors.knn import knn
+from edgel._kernels.parallel import routine
+from edgel._neighbors.kdtree import node_start
 from edgel.curves._circle import RADIUS, along_of, offset_of
 
-REACH = 4.5
-"""Spacings: so far from a curve its faces are measured."""
 BEYOND = 4.0
 """Spacings: so far past its ends is looked whether a curve goes on."""
-_STEP = 1.5  # spacings between the stations where neighbours are asked for
-_AROUND = 64  # points around each: all within REACH
 
 
-@dataclass(frozen=True, eq=False)
-class Beside:
-    """Points of the cloud beside each curve, each once.
-
-    Attributes
-    ----------
-    points : (G,) int64
-        Points of the index.
-    start : (K + 1,) int64
-    """
-
-    points: np.ndarray
-    start: np.ndarray
-
-
-def gather(
-    index: NeighborIndex, xyz: np.ndarray, shapes: np.ndarray, ranges: np.ndarray, spacing: np.ndarray
-) -> Beside:
-    """Find the points (N, 3) of an index that are beside shapes (K, 13), over ranges (K, 2) along them."""
-    count = len(shapes)
-    low, high, _ = widened(shapes, ranges, spacing)
-    number = np.maximum(np.ceil((high - low) / (_STEP * spacing)).astype(np.int64), 1)
-    start = np.concatenate([[0], np.cumsum(number)])
-    owner = np.repeat(np.arange(count), number)
-    step = ((high - low) / number)[owner]
-    along = low[owner] + (np.arange(start[-1]) - start[owner] + 0.5) * step
-    places = on_shapes(shapes[owner], along)
-    if not len(places):
-        return Beside(np.empty(0, np.int64), np.zeros(1, np.int64))
-    near = knn(index, places, min(_AROUND, len(index))).points
-    kept = np.zeros(near.shape, np.bool_)
-    run_slices(_keep, len(places), near, xyz, shapes, spacing, owner, along, step, kept, size=1024)
-    counts = np.bincount(owner, kept.sum(axis=1), minlength=count).astype(np.int64)
-    return Beside(near[kept], np.concatenate([[0], np.cumsum(counts)]))
-
-
-def widened(shapes: np.ndarray, ranges: np.ndarray, spacing: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return ranges with a margin, low and high, and which go all round."""
-    low, high = ranges[:, 0] - BEYOND * spacing, ranges[:, 1] + BEYOND * spacing
+def widened(
+    shapes: np.ndarray, ranges: np.ndarray, spacing: np.ndarray, share: float = 0.0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return ranges with a margin, at least a share of their length, low and high, and which go all round."""
+    margin = np.maximum(BEYOND * spacing, share * (ranges[:, 1] - ranges[:, 0]))
+    low, high = ranges[:, 0] - margin, ranges[:, 1] + margin
     round_ = 2 * np.pi * shapes[:, RADIUS]
     whole = (round_ > 0) & ((ranges[:, 1] - ranges[:, 0] > 0.3 * round_) | (high - low >= round_))
     middle = 0.5 * (low + high)
@@ -73,16 +35,47 @@ def on_shapes(shapes: np.ndarray, along: np.ndarray) -> np.ndarray:
     return origin + np.where(is_line, along[:, None] * w, radius * (np.cos(turn) * u + np.sin(turn) * v))
 
 
-@kernel
-def _keep(start, stop, near, xyz, shapes, spacing, owner, along, step, kept):
-    """Mark the neighbours of each station that are beside it, and not beside the next one."""
-    for q in range(start, stop):
-        shape, h = shapes[owner[q]], spacing[owner[q]]
-        around = 2.0 * np.pi * shape[RADIUS]
-        for k in range(near.shape[1]):
-            i = near[q, k]
-            ahead = along_of(shape, xyz[i, 0], xyz[i, 1], xyz[i, 2]) - along[q]
-            if around > 0.0:
-                ahead -= around * np.floor(ahead / around + 0.5)
-            inside = -0.5 * step[q] <= ahead < 0.5 * step[q]
-            kept[q, k] = inside and offset_of(shape, xyz[i, 0], xyz[i, 1], xyz[i, 2]) < REACH * h
+@routine
+def gather(places, boxes, shape, low, high, reach, near):
+    """Write the points of a tree beside a shape, from `low` to `high` along it, as far as `near` (G, 3) has room.
+
+    Returns how many there are. The distance from a shape changes by no more than the way that one goes, so what is
+    farther from it than its radius and the reach, as the balls around the nodes of the tree are, holds none of them.
+    """
+    stack = np.empty(128, np.int64)
+    leaves, total, number, depth = len(boxes) // 2, places.shape[1], 0, 1
+    radius, middle = shape[RADIUS], 0.5 * (low + high)
+    around, half = 2.0 * math.pi * radius, min(0.5 * (high - low), 2.0 * radius if radius > 0.0 else math.inf)
+    u, v, w = (radius * math.cos(middle / radius), radius * math.sin(middle / radius), 0.0)
+    if radius == 0.0:
+        u, v, w = 0.0, 0.0, middle
+    mx = shape[0] + u * shape[3] + v * shape[6] + w * shape[9]
+    my = shape[1] + u * shape[4] + v * shape[7] + w * shape[10]
+    mz = shape[2] + u * shape[5] + v * shape[8] + w * shape[11]
+    stack[0] = 1
+    while depth > 0:
+        depth -= 1
+        node = stack[depth]
+        x, y = 0.5 * (boxes[node, 0] + boxes[node, 3]), 0.5 * (boxes[node, 1] + boxes[node, 4])
+        z = 0.5 * (boxes[node, 2] + boxes[node, 5])
+        dx, dy, dz = boxes[node, 3] - x, boxes[node, 4] - y, boxes[node, 5] - z
+        far = reach + math.sqrt(dx * dx + dy * dy + dz * dz)
+        dx, dy, dz = x - mx, y - my, z - mz
+        if dx * dx + dy * dy + dz * dz > (half + far) ** 2 or offset_of(shape, x, y, z) > far:
+            continue
+        if node < leaves:
+            stack[depth], stack[depth + 1] = 2 * node + 1, 2 * node
+            depth += 2
+            continue
+        for p in range(node_start(node - leaves, total, leaves), node_start(node - leaves + 1, total, leaves)):
+            x, y, z = places[0, p], places[1, p], places[2, p]
+            if offset_of(shape, x, y, z) > reach:
+                continue
+            along = along_of(shape, x, y, z)
+            if radius > 0.0:
+                along -= around * math.floor((along - low) / around)
+            if low <= along <= high:
+                if number < len(near):
+                    near[number, 0], near[number, 1], near[number, 2] = x, y, z
+                number += 1
+    return number

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
 from edgel._kernels.parallel import kernel, run_slices
 from edgel._neighbors.kdtree import NeighborIndex
-from edgel.curves import _fit, _rims
-from edgel.curves._circle import RADIUS, fit_line
-from edgel.curves._gather import REACH, Beside, gather
-from edgel.curves._lines import fit_line_faces
+from edgel.curves import _fit
+from edgel.curves._circle import RADIUS, SHAPE, fit_circle, fit_line
+from edgel.curves._faces import fit_faces
 from edgel.curves._points import EdgePoints
 from edgel.curves._ranges import ranges_of
-from edgel.curves._rims import fit_rim_faces
 from edgel.edges import EdgeKind
 
-_SHORT, _SHORTEST = 2.4, 1.5  # spacings: of faces too small for REACH
+REACH = 4.5
+"""Spacings: so far from a curve its faces are measured."""
+_SHORT, _SHORTEST = 2.4, 1.5  # of faces too small for that
 _ROUGH = 0.15  # spacings: a face is that rough without the cloud being noisy
 _ROUGHER = 1.35  # times the noise of the cloud: no plane, cylinder or cone is rougher
 _COVERED = 0.2  # of the points that a face of full depth would have
@@ -36,16 +37,14 @@ class Measured:
     Attributes
     ----------
     shape : (K, 13) float64
-    fit : (K, 23) float64
+    fit : (K, 22) float64
         See `_fit`.
     covariance : (K, 10, 10) float64
-        Of circles, see `_rims`.
+        Of the unknowns of `_fit`.
     ranges : (K, 2) float64
         From where to where along each its edge points lie.
     holds : (K,) bool
         Whether its faces confirm it.
-    beside : Beside
-        The points of the cloud that they were measured on.
     """
 
     shape: np.ndarray
@@ -53,12 +52,24 @@ class Measured:
     covariance: np.ndarray
     ranges: np.ndarray
     holds: np.ndarray
-    beside: Beside
+
+    @property
+    def both(self) -> np.ndarray:
+        """Which lie where two faces meet, (K,) bool."""
+        return self.holds & (self.fit[:, _fit.STATE] == _fit.MEASURED)
+
+    def take(self, kept: np.ndarray) -> Measured:
+        """Return some (int)."""
+        return Measured(*(getattr(self, field.name)[kept] for field in fields(self)))
+
+    def and_(self, other: Measured) -> Measured:
+        """Return these and others."""
+        pairs = ((getattr(self, field.name), getattr(other, field.name)) for field in fields(self))
+        return Measured(*(np.concatenate(pair) for pair in pairs))
 
 
 def measure(
     index: NeighborIndex,
-    xyz: np.ndarray,
     shapes: np.ndarray,
     rows: tuple[np.ndarray, np.ndarray],
     points: EdgePoints,
@@ -72,21 +83,20 @@ def measure(
     of them, since small parts have small faces, and an arc that is no arc as a line.
     """
     ranges = ranges_of(shapes, rows, position)
-    beside = gather(index, xyz, shapes, ranges, spacing)
     outline = _outlines(points, rows)
-    best = _attempt(shapes, np.arange(len(shapes)), REACH, beside, xyz, rows, points, position, spacing, ranges)
-    noise = _noise_of(best, spacing)
+    best = _attempt(shapes, np.arange(len(shapes)), REACH, index, rows, points, spacing, ranges)
+    noise = noise_of(best, spacing)
     good = _holds(best, noise, spacing, outline)
     lines = np.zeros_like(shapes)
-    run_slices(_as_lines, len(shapes), lines, *rows, position, size=64)
+    run_slices(_fit_shapes, len(shapes), lines, *rows, position, False, size=64)
     for reach, straight in ((_SHORT, False), (REACH, True), (_SHORT, True), (_SHORTEST, False), (_SHORTEST, True)):
         curved = shapes[:, RADIUS] > 0
-        which = np.flatnonzero((~good | _nearly_straight(best, spacing)) & (curved | (not straight)))
+        which = np.flatnonzero((~good | nearly_straight(best, spacing)) & (curved | (not straight)))
         if not len(which):
             continue
         begin = lines if straight else shapes
         along = ranges_of(begin, rows, position) if straight else ranges
-        other = _attempt(begin, which, reach, beside, xyz, rows, points, position, spacing, along)
+        other = _attempt(begin, which, reach, index, rows, points, spacing, along)
         holds = _holds(other, noise, spacing[which], outline[which])
         better = holds & (
             ~good[which] | (straight & (_rough(other) < 1.15 * _rough(best)[which] + 0.02 * spacing[which]))
@@ -94,7 +104,28 @@ def measure(
         for name in ("shape", "fit", "covariance", "ranges"):
             getattr(best, name)[which[better]] = getattr(other, name)[better]
         good[which[better]] = True
-    return Measured(best.shape, best.fit, best.covariance, ranges_of(best.shape, rows, position), good, beside)
+    return Measured(best.shape, best.fit, best.covariance, ranges_of(best.shape, rows, position), good)
+
+
+def refit(
+    measured: Measured,
+    which: np.ndarray,
+    ranges: np.ndarray,
+    reach: float,
+    rows: tuple[np.ndarray, np.ndarray],
+    points: EdgePoints,
+    spacing: np.ndarray,
+) -> np.ndarray:
+    """Measure some shapes again over other ranges (W, 2), keep what holds, and return which do, (W,) bool."""
+    along = measured.ranges.copy()
+    along[which] = ranges
+    other = _attempt(measured.shape, which, reach, points.index, rows, points, spacing, along)
+    noise = noise_of(measured, spacing)
+    better = _holds(other, noise, spacing[which], np.zeros(len(which), bool))
+    better &= _rough(other) < 1.15 * _rough(measured)[which] + 0.02 * spacing[which]
+    for name in ("shape", "fit", "covariance", "ranges"):
+        getattr(measured, name)[which[better]] = getattr(other, name)[better]
+    return better
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,34 +140,32 @@ def _attempt(
     shapes: np.ndarray,
     which: np.ndarray,
     reach: float,
-    beside: Beside,
-    xyz: np.ndarray,
+    index: NeighborIndex,
     rows: tuple[np.ndarray, np.ndarray],
     points: EdgePoints,
-    position: np.ndarray,
     spacing: np.ndarray,
     ranges: np.ndarray,
 ) -> _Attempt:
     """Fit the faces beside some shapes, as far from the edge as a reach, in spacings."""
     shape, fit = shapes[which], np.full((len(which), _fit.FIT), np.nan)
     fit[:, _fit.STATE] = _fit.NONE
-    covariance = np.zeros((len(which), _rims.UNKNOWNS, _rims.UNKNOWNS))
-    arguments = (which, reach, shape, beside.points, beside.start, xyz, *rows, points.position, points.normals)
-    run_slices(_fit_faces, len(which), *arguments, spacing, ranges, fit, covariance, size=8)
+    covariance = np.zeros((len(which), _fit.UNKNOWNS, _fit.UNKNOWNS))
+    arguments = (which, reach, shape, index.xyz, index.boxes, *rows, points.position, points.normals)
+    run_slices(fit_faces, len(which), *arguments, spacing, ranges, fit, covariance, size=8)
     return _Attempt(shape, fit, covariance, ranges[which].copy())
 
 
-def _rough(fitted: _Attempt) -> np.ndarray:
+def _rough(fitted: _Attempt | Measured) -> np.ndarray:
     return np.nan_to_num(fitted.fit[:, _fit.SIGMA : _fit.SIGMA + 2], nan=np.inf).max(axis=1)
 
 
-def _noise_of(fitted: _Attempt, spacing: np.ndarray) -> float:
+def noise_of(fitted: Any, spacing: np.ndarray) -> float:
     """Return how far points lie from faces, in spacings, in the middle of all fits."""
     both = fitted.fit[:, _fit.STATE] == _fit.MEASURED
     return float(np.median(fitted.fit[both, _fit.SIGMA : _fit.SIGMA + 2] / spacing[both, None])) if both.any() else 0.0
 
 
-def _nearly_straight(fitted: _Attempt, spacing: np.ndarray) -> np.ndarray:
+def nearly_straight(fitted: _Attempt | Measured, spacing: np.ndarray) -> np.ndarray:
     """Tell which arcs (K,) are so short that lines may be meant."""
     radius = fitted.shape[:, RADIUS]
     length = fitted.ranges[:, 1] - fitted.ranges[:, 0]
@@ -173,36 +202,18 @@ def mean_of(values: np.ndarray, rows: tuple[np.ndarray, np.ndarray]) -> np.ndarr
     return np.add.reduceat(values[rows[0]], rows[1][:-1]) / np.diff(rows[1])
 
 
+def circles_through(rows: tuple[np.ndarray, np.ndarray], position: np.ndarray) -> np.ndarray:
+    """Return the circles (K, 13) through edge points, given as rows of `position` and where each circle's begin."""
+    shapes = np.zeros((len(rows[1]) - 1, SHAPE))
+    run_slices(_fit_shapes, len(shapes), shapes, *rows, position, True, size=64)
+    return shapes
+
+
 @kernel
-def _as_lines(start, stop, lines, rows, first, position):
+def _fit_shapes(start, stop, shapes, rows, first, position, are_round):
     for k in range(start, stop):
-        fit_line(position, rows[first[k] : first[k + 1]], lines[k])
-
-
-@kernel
-def _fit_faces(
-    start,
-    stop,
-    which,
-    reach,
-    shape,
-    beside,
-    begin,
-    xyz,
-    rows,
-    first,
-    position,
-    normals,
-    spacing,
-    ranges,
-    fit,
-    covariance,
-):
-    for q in range(start, stop):
-        k = which[q]
-        near, own = beside[begin[k] : begin[k + 1]], rows[first[k] : first[k + 1]]
-        h, low, high = spacing[k], ranges[k, 0], ranges[k, 1]
-        if shape[q, RADIUS] == 0.0:
-            fit_line_faces(shape[q], near, xyz, own, position, normals, h, reach, low, high, fit[q])
+        own = rows[first[k] : first[k + 1]]
+        if are_round:
+            fit_circle(position, own, shapes[k])
         else:
-            fit_rim_faces(shape[q], near, xyz, own, position, normals, h, reach, low, high, fit[q], covariance[q])
+            fit_line(position, own, shapes[k])

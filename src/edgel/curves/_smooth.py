@@ -69,7 +69,7 @@ def _fill_tangents(start, stop, position, known, spacing, neighbors, tangent):
     """Where no tangent is known: the main direction of the points around, if they have one."""
     for i in range(start, stop):
         if known[i, 0] != 0.0 or known[i, 1] != 0.0 or known[i, 2] != 0.0:
-            tangent[i] = known[i]
+            tangent[i, 0], tangent[i, 1], tangent[i, 2] = known[i, 0], known[i, 1], known[i, 2]
             continue
         reach = _REACH * spacing[i]
         xx = xy = xz = yy = yz = zz = 0.0

@@ -76,32 +76,32 @@ def split(chains: Chains, position: np.ndarray, spacing: np.ndarray, spread: np.
 
 @kernel
 def _split_chains(start, stop, points, begin, closed, position, spacing, spread, slots, cuts, shape, fits, counts):
+    arc = np.empty(SHAPE)
     for chain in range(start, stop):
         first, last = begin[chain], begin[chain + 1]
-        count = last - first
-        rows = points[first:last]
+        count, slot, shift = last - first, slots[chain], 0
         h = noise = 0.0
-        for i in rows:
+        for i in points[first:last]:
             h, noise = h + spacing[i], noise + spread[i]
         h, noise = h / count, noise / count
         sigma = max(_FLOOR * h, 0.5 * noise)
-        slot = slots[chain]
-        shift = 0
-        number = _merge(rows, position, h, sigma, cuts[slot:], shape[slot:], closed[chain])
-        if closed[chain] and number > 1:  # begin at a border, so that no piece is cut where the walk began
+        number, rows = 0, points[first:last]
+        # Of a closed chain once more, from a border on, so that no piece is cut where the walk began.
+        for turn in range(2):
+            number = _merge(rows, position, h, sigma, cuts[slot:], shape[slot:], arc, closed[chain] and turn == 0)
+            if not closed[chain] or number == 1 or turn == 1:
+                break
             shift = cuts[slot, 1]
-            number = _merge(
-                np.concatenate((rows[shift:], rows[:shift])), position, h, sigma, cuts[slot:], shape[slot:], False
-            )
+            rows = np.empty(count, np.int64)
+            for i in range(count):
+                rows[i] = points[first + (i + shift) % count]
         counts[chain] = number
-        for k in range(number):
-            a, b = cuts[slot + k, 0] + shift, cuts[slot + k, 1] + shift
-            cuts[slot + k, 0], cuts[slot + k, 1] = first + a, first + b
+        for k in range(slot, slot + number):
             square = 0.0
-            for q in range(a, b):
-                i = rows[q % count]
-                square += _squared(shape[slot + k], position, i)
-            fits[slot + k] = square / (b - a) < max(_FREE * sigma, 0.25 * h) ** 2
+            for i in rows[cuts[k, 0] : cuts[k, 1]]:
+                square += _squared(shape[k], position, i)
+            fits[k] = square / (cuts[k, 1] - cuts[k, 0]) < max(_FREE * sigma, 0.25 * h) ** 2
+            cuts[k, 0], cuts[k, 1] = first + shift + cuts[k, 0], first + shift + cuts[k, 1]
 
 
 @routine
@@ -116,18 +116,17 @@ def _squared(shape, position, i):
 
 
 @routine
-def _best(rows, position, h, sigma, shape):
+def _best(rows, position, h, sigma, shape, arc):
     """Write the line or the arc that explains some rows at less cost, and return the cost."""
     penalty = math.log(max(len(rows), 3))
     fit_line(position, rows, shape)
     cost = _cost(rows, position, sigma, shape) + 4.0 * penalty
-    if len(rows) >= 6:
-        arc = np.empty(SHAPE)
-        if fit_circle(position, rows, arc) < math.inf and arc[RADIUS] < _LARGEST * h:
-            price = _cost(rows, position, sigma, arc) + 7.0 * penalty
-            if price < cost:
-                shape[:] = arc
-                cost = price
+    if len(rows) >= 6 and fit_circle(position, rows, arc) < math.inf and arc[RADIUS] < _LARGEST * h:
+        price = _cost(rows, position, sigma, arc) + 7.0 * penalty
+        if price < cost:
+            cost = price
+            for i in range(SHAPE):
+                shape[i] = arc[i]
     return cost
 
 
@@ -140,58 +139,56 @@ def _cost(rows, position, sigma, shape):
 
 
 @routine
-def _merge(rows, position, h, sigma, cuts, shape, closed):
+def _merge(rows, position, h, sigma, cuts, shape, arc, closed):
     """Write the pieces of a chain and their shapes, and return how many there are."""
-    count = len(rows)
-    whole = np.empty(SHAPE)
+    count, first = len(rows), shape[0]
+    cuts[0, 0], cuts[0, 1] = 0, count
+    if closed:  # one circle round, before its pieces find lines
+        cost = _best(rows, position, h, sigma, first, arc)
+        if first[RADIUS] > 0.0 and cost < _CLEAR * count / _ALIKE:
+            return 1
     pieces = max(count // _PIECE, 1)
-    costs, gains, merged = np.empty(pieces), np.full(pieces, -math.inf), np.empty(pieces)
+    costs, gains, merged = np.empty(pieces), np.empty(pieces), np.empty(pieces)
+    border = _BORDER * math.log(count)
     for k in range(pieces):
         cuts[k, 0], cuts[k, 1] = k * _PIECE, (k + 1) * _PIECE if k < pieces - 1 else count
-        costs[k] = _best(rows[cuts[k, 0] : cuts[k, 1]], position, h, sigma, shape[k])
-    border = _BORDER * math.log(count)
-    if closed:  # one circle round, before its pieces find lines
-        cost = _best(rows, position, h, sigma, whole)
-        if whole[RADIUS] > 0.0 and cost < _CLEAR * count / _ALIKE:
-            cuts[0, 0], cuts[0, 1] = 0, count
-            shape[0] = whole
-            return 1
-    for k in range(pieces - 1):
-        merged[k] = _best(rows[cuts[k, 0] : cuts[k + 1, 1]], position, h, sigma, whole)
-        gains[k] = costs[k] + costs[k + 1] + border - merged[k]
-    while pieces > 1:
-        k = np.argmax(gains[: pieces - 1])
-        if not gains[k] > 0.0:
-            break
-        cuts[k, 1], costs[k] = cuts[k + 1, 1], merged[k]
-        for j in range(k + 1, pieces - 1):
-            cuts[j], costs[j], gains[j - 1], merged[j - 1] = cuts[j + 1], costs[j + 1], gains[j], merged[j]
-        pieces -= 1
-        for j in (k - 1, k):
-            if 0 <= j < pieces - 1:
-                merged[j] = _best(rows[cuts[j, 0] : cuts[j + 1, 1]], position, h, sigma, whole)
-                gains[j] = costs[j] + costs[j + 1] + border - merged[j]
+    low, high = 0, pieces  # where costs, and what merging with the next would gain, are not known yet
     for k in range(pieces):
-        _best(rows[cuts[k, 0] : cuts[k, 1]], position, h, sigma, shape[k])
-    _move_borders(rows, position, h, sigma, pieces, cuts, shape)
+        costs[k] = _best(rows[cuts[k, 0] : cuts[k, 1]], position, h, sigma, shape[k], arc)
+    while pieces > 1:
+        for k in range(max(low, 0), min(high, pieces - 1)):
+            merged[k] = _best(rows[cuts[k, 0] : cuts[k + 1, 1]], position, h, sigma, shape[k], arc)
+            gains[k] = costs[k] + costs[k + 1] + border - merged[k]
+        best = 0
+        for k in range(pieces - 1):
+            if gains[k] > gains[best]:
+                best = k
+        if not gains[best] > 0.0:
+            break
+        cuts[best, 1], costs[best] = cuts[best + 1, 1], merged[best]
+        for k in range(best + 1, pieces - 1):
+            cuts[k, 0], cuts[k, 1], costs[k] = cuts[k + 1, 0], cuts[k + 1, 1], costs[k + 1]
+            gains[k - 1], merged[k - 1] = gains[k], merged[k]
+        pieces -= 1
+        low, high = best - 1, best + 1
+    for k in range(pieces - 1):
+        cuts[k, 1] = cuts[k + 1, 0] = _border(rows, position, h, sigma, k, cuts, shape, arc)
+    for k in range(pieces):
+        _best(rows[cuts[k, 0] : cuts[k, 1]], position, h, sigma, shape[k], arc)
     return pieces
 
 
 @routine
-def _move_borders(rows, position, h, sigma, pieces, cuts, shape):
-    """Move each border to where the shapes beside it explain most."""
-    for k in range(pieces - 1):
-        low, high = max(cuts[k, 0] + 2, cuts[k, 1] - 8), min(cuts[k + 1, 1] - 2, cuts[k, 1] + 8)
-        best, at, total = math.inf, cuts[k, 1], 0.0
-        for q in range(low, high):
-            i = rows[q]
-            if total < best:
-                best, at = total, q
-            far = _FAR * sigma * sigma
-            total += min(_squared(shape[k], position, i), far) - min(_squared(shape[k + 1], position, i), far)
+def _border(rows, position, h, sigma, k, cuts, shape, arc):
+    """Return where the shapes beside the k-th border explain most, near where it is."""
+    for s in (k, k + 1):
+        _best(rows[cuts[s, 0] : cuts[s, 1]], position, h, sigma, shape[s], arc)
+    low, high = max(cuts[k, 0] + 2, cuts[k, 1] - 8), min(cuts[k + 1, 1] - 2, cuts[k, 1] + 8)
+    if low >= high:
+        return cuts[k, 1]
+    best, at, total, far = math.inf, cuts[k, 1], 0.0, _FAR * sigma * sigma
+    for q in range(low, high):
         if total < best:
-            at = high
-        if at != cuts[k, 1] and low < high:
-            cuts[k, 1] = cuts[k + 1, 0] = at
-            for s in (k, k + 1):
-                _best(rows[cuts[s, 0] : cuts[s, 1]], position, h, sigma, shape[s])
+            best, at = total, q
+        total += min(_squared(shape[k], position, rows[q]), far) - min(_squared(shape[k + 1], position, rows[q]), far)
+    return high if total < best else at

@@ -13,8 +13,8 @@ from edgel.curves._corners import Ends
 from edgel.curves._extent import extents
 from edgel.curves._gather import on_shapes
 from edgel.curves._points import EdgePoints
-from edgel.curves._rims import UNKNOWNS
-from edgel.curves._shapes import Shapes, take_rows
+from edgel.curves._rows import take_rows
+from edgel.curves._shapes import Shapes
 
 _EVIDENCE, _STRENGTH = 0.33, 0.3
 """Strength of its edge points, added up, a spacing of a shape; and their mean, at least."""
@@ -34,7 +34,7 @@ class Strands:
     ----------
     shape : (N, 13) float64
         Of a run the line at its middle, with the radius NaN.
-    fit : (N, 23) float64
+    fit : (N, 22) float64
     covariance : (N, 10, 10) float64
     along : (N, 2) float64
         From where to where along the shape.
@@ -75,10 +75,10 @@ class Strands:
         return self.places[self.rows[1][strand] : self.rows[1][strand + 1]]
 
 
-def find_strands(shapes: Shapes, xyz: np.ndarray, points: EdgePoints) -> Strands:
+def find_strands(shapes: Shapes, points: EdgePoints) -> Strands:
     """Find where shapes are edges, and which runs are worth keeping."""
     measured, position = shapes.measured, shapes.smoothed.position
-    found = extents(measured, xyz, shapes.rows, position, measured.ranges, shapes.spacing)
+    found = extents(measured, points.index, shapes.rows, position, measured.ranges, shapes.spacing)
     on = found.shape
     length = np.bincount(on, (found.ends[:, 1] - found.ends[:, 0]) / shapes.spacing[on], len(shapes.spacing))
     kept = _evident(measured.fit, shapes.rows, points.strength, np.maximum(length, 1.0))[on]
@@ -101,7 +101,7 @@ def find_strands(shapes: Shapes, xyz: np.ndarray, points: EdgePoints) -> Strands
     return Strands(
         np.concatenate([measured.shape[on], lines]),
         np.concatenate([measured.fit[on], none]),
-        np.concatenate([measured.covariance[on], np.zeros((number, UNKNOWNS, UNKNOWNS))]),
+        np.concatenate([measured.covariance[on], np.zeros((number, _fit.UNKNOWNS, _fit.UNKNOWNS))]),
         np.concatenate([ends, np.zeros((number, 2))]),
         np.concatenate([closed, np.array([is_closed for _, is_closed in runs], bool)]),
         np.concatenate([shapes.spacing[on], np.array(spacing)]),

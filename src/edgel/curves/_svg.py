@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from edgel.curves._curves import CurveKind, Curves
+from edgel.curves._labels import SIZE, place_labels
 from edgel.edges import EdgeKind
 from edgel.io.files import replacing
 
@@ -39,7 +40,7 @@ def write(path: str | os.PathLike[str], curves: Curves, *, view: str, unit: str,
 
 
 def drawing(curves: Curves, view: str, factor: float, labels: Sequence[str] = ()) -> str:
-    """Return an SVG in which a unit of the cloud has so many millimetres, with a label at the middle of each curve."""
+    """Return an SVG in which a unit of the cloud has so many millimetres, with labels where there is room."""
     right, up = VIEWS[view]
     flat = curves.vertices[:, [right, up]]
     low, high = (flat.min(axis=0), flat.max(axis=0)) if len(flat) else (np.zeros(2), np.zeros(2))
@@ -65,7 +66,10 @@ def drawing(curves: Curves, view: str, factor: float, labels: Sequence[str] = ()
         else:
             places = " ".join(f"{x:.5f},{y:.5f}" for x, y in path)
             lines.append(f'<polyline points="{places}" stroke="{color}"/>')
-        if labels and labels[curve]:
-            x, y = path[len(path) // 2] if len(path) > 2 else path.mean(axis=0)
-            lines.append(f'<text x="{x:.2f}" y="{y:.2f}" font-size="3" fill="{color}">{labels[curve]}</text>')
+    if labels:
+        paths = [on_paper(curves.points_of(curve)) for curve in range(len(curves))]
+        importance = np.where(curves.kind == CurveKind.CIRCLE, np.inf, curves.length)
+        for curve, (x, y) in place_labels(paths, labels, importance, width, height).items():
+            color = _COLORS.get(EdgeKind(int(curves.edge[curve])), "#666")
+            lines.append(f'<text x="{x:.2f}" y="{y:.2f}" font-size="{SIZE:g}" fill="{color}">{labels[curve]}</text>')
     return "\n".join([*lines, "</svg>"]) + "\n"

@@ -62,5 +62,5 @@ def trace(points: Any, edges: Edges) -> Curves:
     origin = finite.xyz.mean(axis=0)
     xyz = finite.xyz - origin
     found = edge_points(xyz, np.searchsorted(finite.rows, edges.index), edges, origin)
-    strands = find_strands(find_shapes(xyz, found), xyz, found)
+    strands = find_strands(find_shapes(found), found)
     return assemble(strands, found, edges, origin, cloud.crs)

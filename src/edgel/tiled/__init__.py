@@ -6,5 +6,6 @@ line and the chains across seams are merged; each file's edge points are written
 """
 
 from edgel.tiled.run import Tiled, TileError, detect
+from edgel.tiled.surroundings import is_run, surroundings
 
-__all__ = ["TileError", "Tiled", "detect"]
+__all__ = ["TileError", "Tiled", "detect", "is_run", "surroundings"]

@@ -1,0 +1,28 @@
+"""Curves of a tiled result: those of the whole cloud, with nothing cut at a seam."""
+
+import numpy as np
+import pytest
+
+import edgel
+from edgel import tiled
+
+
+def test_curves_of_tiles_are_those_of_the_whole(files, strip, tmp_path):
+    out = tmp_path / "out"
+    tiled.detect(files, out, tile_points=3000, min_strength=0.15)
+    assert tiled.is_run(out)
+    cloud, edges = tiled.surroundings(out)
+    assert len(cloud) <= len(strip)
+    assert edges.num_points == len(cloud)
+    mine = edgel.curves.trace(cloud, edges)
+    whole = edgel.curves.trace(strip, edgel.detect(strip, method="surface", min_strength=0.15))
+    assert len(mine) == len(whole) > 50
+    first, second = (curves.vertices[np.lexsort(curves.vertices.round(5).T)] for curves in (mine, whole))
+    np.testing.assert_allclose(first, second, atol=1e-6)
+
+
+def test_a_run_whose_state_is_gone_is_named(tmp_path):
+    assert not tiled.is_run(tmp_path)
+    (tmp_path / "manifest.json").write_text("{}")
+    with pytest.raises(FileNotFoundError, match="as-one again"):
+        tiled.surroundings(tmp_path)
