@@ -1,0 +1,113 @@
+"""The documentation holds: every block of Python and every command of README.md and docs/ runs, page by page.
+
+The blocks of a page run in their order, in one namespace and one folder, in which lie the files that a page takes for
+granted: a scan in several formats, a depth image, tiles. What cannot run here is named below, with where it does run.
+"""
+
+import glob
+import json
+import re
+import shlex
+import warnings
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from typer.testing import CliRunner
+
+import edgel
+from edgel._cli import app
+
+ROOT = Path(__file__).parents[1]
+PAGES = [path for path in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))) if path.is_file()]
+if (ROOT / "mkdocs.yml").is_file():
+    PAGES += [ROOT / "CONTRIBUTING.md"]
+ELSEWHERE = {
+    "pip install": "make release-check installs the wheel",
+    "python3 -m venv": "make release-check",
+    ". .venv/bin/activate": "make release-check",
+    ".venv/bin/": "make release-check, .ci/run",
+    "make ": ".ci/run, make release-check",
+    "git ": "it changes the checkout, or needs the network",
+    "dask ": "a cluster; tests/tiled",
+    "edgel demo": "tests/demo, make release-check",
+    "edgel view": "waits for a browser; tests/viewer",
+}
+NEEDS = r"(?:<!-- needs: (?P<needs>\w+) -->\n)?"
+BLOCK = re.compile(NEEDS + r"^```(?P<kind>python|console)\n(?P<text>.*?)^```$", re.M | re.S)
+
+
+def blocks(page):
+    """What a page shows to run: (kind, text, module that it needs)."""
+    text = page.read_text()
+    found = [(m.start(), m["kind"], m["text"], m["needs"]) for m in BLOCK.finditer(text)]
+    indented = re.finditer(r"^    (edgel (?!COMMAND).*)$", BLOCK.sub(lambda m: " " * len(m[0]), text), re.M)
+    found += [(m.start(), "console", m[1], None) for m in indented]
+    return [block[1:] for block in sorted(found, key=lambda block: block[0])]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    x, y = (values.ravel() for values in np.meshgrid(np.arange(40.0), np.arange(40.0)))
+    colors = {name: np.full(1600, 99, np.uint16) for name in ("red", "green", "blue")}
+    labels = np.where(x + y < 50, 6, 2).astype(np.uint8)
+    returns = np.ones(1600, np.uint8)
+    place = np.c_[x, y, 15 - abs(x - 18)] + [637000, 849000, 0]
+    scan = edgel.Cloud(
+        place, {"classification": labels, "intensity": np.ones(1600, np.uint16), "return_number": returns, **colors}
+    )
+    names = ["scan.ply", "scan.laz", "scan.las", "scan.pcd", "scans/a.ply", "scans/b.ply", "city/a.laz"]
+    for name in names:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        edgel.write(tmp_path / name, scan)
+    edgel.write(tmp_path / "city/b.laz", edgel.Cloud(scan.xyz + [40, 0, 0], scan.attributes))
+    (tmp_path / "demo").mkdir()
+    edgel.write(tmp_path / "demo/tee.ply", edgel.synth.scan(edgel.synth.tee(), num_points=20_000).cloud)
+    depth = np.full((60, 80), 2000, np.uint16)
+    depth[20:40, 20:40] = 1500
+    Image.fromarray(depth).save(tmp_path / "depth.png")
+    (tmp_path / "camera.json").write_text(json.dumps({"fx": 80, "fy": 80, "ppx": 39.5, "ppy": 29.5}))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    return tmp_path
+
+
+def run_command(line):
+    """Run a command of edgel as a shell would; others have to be among those that run elsewhere."""
+    line = re.sub(r"\s+#.*", "", line).strip()
+    if not line or line.startswith(tuple(ELSEWHERE)):
+        return
+    assert line.startswith("edgel "), f"nobody runs this: {line}"
+    words = shlex.split(line)[1:]
+    words = [name for word in words for name in (sorted(glob.glob(word)) or [word])]
+    if "--workers" in words:  # each would load the kernels anew; tests/cli has them
+        words[words.index("--workers") + 1] = "1"
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 0, f"{line}\n{result.output}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_block_runs(page, folder):
+    shown = blocks(page)
+    if not shown:
+        pytest.skip("nothing to run on this page")
+    names = {"__name__": "__main__"}
+    for kind, text, needs in shown:
+        if kind == "console":
+            for line in text.splitlines():
+                run_command(line)
+        elif needs is None or find_spec(needs):
+            with warnings.catch_warnings():
+                if needs:  # other people's
+                    warnings.simplefilter("ignore")
+                exec(compile(text, str(page), "exec"), names)
+
+
+@pytest.mark.skipif(not (ROOT / "mkdocs.yml").is_file(), reason="the source distribution has no docs")
+def test_python_blocks_name_what_they_need():
+    """Nothing hides from the runner: no fence is in another spelling of Python or of a shell."""
+    for page in PAGES:
+        kinds = re.findall(r"^ *```(\w+)", page.read_text(), re.M)
+        assert set(kinds) <= {"python", "console", "text", "yaml", "toml"}, page
