@@ -1,0 +1,240 @@
+"""All that a release must hold, from the packages to the notebooks; what does not hold ends it.
+
+Run: make release-check, or python packaging/release_check.py [STEP ...]. It leaves dist/ with what would be uploaded,
+and with the recipe for conda-forge.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import tomllib
+import urllib.request
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import yaml
+
+ROOT = Path(__file__).parents[1]
+DIST = ROOT / "dist"
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+SUPPORTED = [row.split(" :: ")[-1] for row in PROJECT["classifiers"] if re.search(r"Python :: 3\.\d+$", row)]
+SCHEMAS = {
+    "github-workflows": ".github/workflows/*.yml",
+    "github-issue-forms": ".github/ISSUE_TEMPLATE/[!c]*.yml",
+    "github-issue-config": ".github/ISSUE_TEMPLATE/config.yml",
+    "citation-file-format": "CITATION.cff",
+    "readthedocs": ".readthedocs.yaml",
+}
+LEAST_RATING = 9  # of pyroma's 10: it asks for an address of electronic mail, which the project has none of
+ON_CONDA = {"matplotlib": "matplotlib-base"}  # names that differ there
+SERVED = 60.0  # seconds that the viewer may take to answer
+
+
+def tell(what: str) -> None:
+    """Say what begins."""
+    print(f"== {what}", flush=True)
+
+
+def run(*words: object, cwd: Path = ROOT, **environment: str) -> str:
+    """Run a program and return what it printed; SystemExit with all of it where it fails."""
+    env = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "VIRTUAL_ENV")} | environment
+    done = subprocess.run([*map(str, words)], cwd=cwd, env=env, text=True, stdout=-1, stderr=subprocess.STDOUT)
+    if done.returncode:
+        raise SystemExit(f"{' '.join(map(str, words))}\n{done.stdout}\nfailed: exit code {done.returncode}")
+    return done.stdout
+
+
+def tool(*words: object) -> str:
+    """Run a module of the environment that this runs in."""
+    return run(sys.executable, "-m", *words)
+
+
+def version() -> str:
+    """Version of the sources."""
+    found = re.search(r'^__version__ = "(.+)"$', (ROOT / "src/edgel/__init__.py").read_text(), re.M)
+    assert found
+    return found[1]
+
+
+def wheel() -> Path:
+    """The wheel that was built."""
+    return DIST / f"edgel-{version()}-py3-none-any.whl"
+
+
+def agree() -> None:
+    """Versions, addresses and dependencies are the same wherever they stand."""
+    tell("versions, addresses and dependencies agree")
+    recipe_text = (ROOT / "packaging/recipe.yaml").read_text()
+    recipe = yaml.safe_load(recipe_text)
+    said = {
+        "CITATION.cff": yaml.safe_load((ROOT / "CITATION.cff").read_text())["version"],
+        "packaging/recipe.yaml": recipe["context"]["version"],
+        "CHANGELOG.md": re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(), re.M)[1],  # pyright: ignore[reportOptionalSubscript]
+    }
+    wrong = [f"{name} says {number}" for name, number in said.items() if number != version()]
+    known = set(PROJECT["urls"].values())
+    repository, pages = PROJECT["urls"]["Repository"], PROJECT["urls"]["Documentation"]
+    for path in ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CITATION.cff", "mkdocs.yml", "packaging/recipe.yaml"):
+        urls = re.findall(r"https://(?:github\.com|[\w.]*readthedocs\.io)/[^\s)\]>\"`]*", (ROOT / path).read_text())
+        others = [url for url in urls if url not in known and not url.startswith((repository, pages))]
+        wrong += [f"{path} has another address: {url}" for url in others]
+    needed = {re.match(r"[\w.-]+", row)[0]: row for row in PROJECT["dependencies"]}  # pyright: ignore[reportOptionalSubscript]
+    listed = {row.split()[0]: row for row in recipe["requirements"]["run"]}
+    for name, row in needed.items():
+        least = row.split(">=")[1]
+        if listed.get(ON_CONDA.get(name, name), "").split(">=")[-1] != least:
+            wrong.append(f"packaging/recipe.yaml: {name} is not >={least}")
+    if wrong:
+        raise SystemExit("\n".join(wrong))
+    for schema, pattern in SCHEMAS.items():
+        tool("check_jsonschema", "--builtin-schema", f"vendor.{schema}", *sorted(ROOT.glob(pattern)))
+
+
+def packages() -> None:
+    """Wheel and sdist, built from nothing and looked at by four programs."""
+    tell("wheel and sdist")
+    shutil.rmtree(DIST, ignore_errors=True)
+    tool("build", "--outdir", DIST, ROOT)
+    sdist = DIST / f"edgel-{version()}.tar.gz"
+    tool("twine", "check", "--strict", wheel(), sdist)
+    tool("check_wheel_contents", wheel())
+    rating = int(
+        re.search(r"Final rating: (\d+)/10", run(Path(sys.executable).with_name("pyroma"), "-n", "0", sdist))[1]
+    )  # pyright: ignore[reportOptionalSubscript]
+    if rating < LEAST_RATING:
+        raise SystemExit(tool("pyroma", sdist))
+    checksum = hashlib.sha256(sdist.read_bytes()).hexdigest()
+    recipe = (ROOT / "packaging/recipe.yaml").read_text()
+    (DIST / "recipe.yaml").write_text(recipe.replace("sha256: SHA256", f"sha256: {checksum}"))
+
+
+def interpreters() -> dict[str, str]:
+    """Every supported Python that is here: version to program."""
+    found = {}
+    for number in SUPPORTED:
+        words = [sys.executable, "-m", "uv", "python", "find", "--no-python-downloads", "--system", number]
+        done = subprocess.run(words, capture_output=True, text=True, check=False)
+        if done.returncode == 0:
+            found[number] = done.stdout.strip()
+        else:
+            print(f"   Python {number} is not here")
+    if not found:
+        raise SystemExit("no supported Python was found")
+    return found
+
+
+def bare() -> None:
+    """From an empty folder with Python only, as the first page says: install, demo, detect, view."""
+    for number, python in interpreters().items():
+        tell(f"Python {number}: a bare environment")
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            programs = environment(folder, python, f"{wheel()}[view]")
+            run(programs / "edgel", "demo", "-o", "demo", cwd=folder)
+            run(programs / "edgel", "detect", "demo/tee.ply", "-o", "edges.ply", cwd=folder)
+            real = ROOT / "benchmarks/real/ensenso.npz"
+            run(programs / "edgel", "detect", real, "-o", "real.ply", cwd=folder)
+            run(programs / "edgel", "render", "edges.ply", "-o", "picture.png", cwd=folder)
+            serve(programs / "edgel", folder)
+
+
+def environment(folder: Path, python: str, *wanted: str) -> Path:
+    """Make a virtual environment with some packages, and return where its programs lie."""
+    run(python, "-m", "venv", folder / "venv")
+    programs = folder / "venv" / ("Scripts" if os.name == "nt" else "bin")
+    run(programs / "python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *wanted)
+    return programs
+
+
+def serve(program: Path, folder: Path) -> None:
+    """Start the viewer and get its page."""
+    words = [program, "view", "demo/tee.ply", "--no-browser", "--port", "0"]
+    with subprocess.Popen(words, cwd=folder, text=True, stdout=-1, stderr=subprocess.STDOUT) as viewer:
+        assert viewer.stdout
+        try:
+            begin = time.monotonic()
+            for line in viewer.stdout:
+                if found := re.search(r"http://\S+", line):
+                    with urllib.request.urlopen(found[0], timeout=SERVED) as page:
+                        assert page.status == 200
+                    return
+                if time.monotonic() - begin > SERVED:
+                    break
+            raise SystemExit("the viewer gave no address")
+        finally:
+            viewer.terminate()
+
+
+def pages() -> None:
+    """Every block of the documentation, with the wheel and everything that the pages install."""
+    tell("every page, with the wheel")
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        number, python = next(iter(interpreters().items()))
+        programs = environment(folder, python, f"{wheel()}[export,lines,ros,view]", "pytest")
+        tell(f"Python {number}: blocks of README.md and docs/")
+        run_pages(programs, folder)
+
+
+def run_pages(programs: Path, folder: Path, *chosen: str) -> None:
+    """Run the tests of the pages by the edgel that is installed, not by the sources."""
+    words = ["-q", "--noconftest", "-c", os.devnull, f"--rootdir={ROOT}", "-p", "no:cacheprovider", *chosen]
+    run(programs / "python", "-P", "-m", "pytest", *words, ROOT / "tests/test_docs.py", cwd=folder, MPLBACKEND="Agg")
+
+
+def oldest() -> None:
+    """The oldest versions that pyproject.toml allows, on the oldest Python."""
+    tell("the oldest dependencies")
+    found = interpreters()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        run(found[min(found, key=lambda number: int(number.split(".")[1]))], "-m", "venv", folder / "venv")
+        programs = folder / "venv" / ("Scripts" if os.name == "nt" else "bin")
+        python = ("--python", programs / "python")
+        wanted = f"{wheel()}[view]"
+        tool("uv", "pip", "install", "--quiet", *python, "--resolution", "lowest-direct", wanted, "pytest>=8.2")
+        print(tool("uv", "pip", "list", *python))
+        run_pages(programs, folder, "-k", "README or start or research or depth-frames")
+
+
+def notebooks() -> None:
+    """The notebooks, from the first cell to the last."""
+    import nbclient
+    import nbformat
+
+    for path in sorted((ROOT / "notebooks").glob("*.ipynb")):
+        tell(f"notebooks/{path.name}")
+        with tempfile.TemporaryDirectory() as folder:
+            notebook = nbformat.read(path, as_version=4)
+            nbclient.NotebookClient(notebook, timeout=900, resources={"metadata": {"path": folder}}).execute()
+
+
+STEPS: dict[str, Callable[[], None]] = {
+    "agree": agree,
+    "packages": packages,
+    "bare": bare,
+    "pages": pages,
+    "oldest": oldest,
+    "notebooks": notebooks,
+}
+
+
+def main(words: Sequence[str] | None = None) -> None:
+    """Run the steps asked for, or all."""
+    parser = argparse.ArgumentParser(description="All that a release must hold.")
+    parser.add_argument("steps", nargs="*", help=f"some of: {', '.join(STEPS)} (default: all)")
+    for step in parser.parse_args(words).steps or STEPS:
+        STEPS[step]()
+    tell(f"edgel {version()} may be released: {DIST}")
+
+
+if __name__ == "__main__":
+    main()
