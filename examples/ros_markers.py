@@ -1,10 +1,10 @@
-"""Edges and lines of a ROS recording as ROS messages: a PointCloud2 of edge points and a Marker of lines for each cloud.
+"""Edges and lines of a ROS recording as ROS messages: a PointCloud2 and a Marker for each cloud.
 
-    python examples/ros_markers.py drive.mcap edges                     # a rosbag 2 in the folder edges, for RViz or Foxglove
+    python examples/ros_markers.py drive.mcap edges            # a rosbag 2 in the folder edges, for RViz or Foxglove
     python examples/ros_markers.py drive.bag edges --topic /velodyne_points --frames 10
 
-It needs no ROS (``pip install 'edgel[ros]'``). In a node of yours `edge_points` and `lines` do the same with the message
-types of ``sensor_msgs.msg`` and ``visualization_msgs.msg``: pass a `types` that looks them up by name.
+It needs no ROS (``pip install 'edgel[ros]'``). In a node of yours `edge_points` and `lines` do the same with the
+message types of ``sensor_msgs.msg`` and ``visualization_msgs.msg``: pass a `types` that looks them up by name.
 """
 
 import argparse
@@ -39,11 +39,10 @@ def edge_points(types: Mapping[str, Any], edges: edgel.Edges, facts: Mapping[str
         records[name] = values
     records["rgb"] = kind_colors(edges.kind).astype(np.uint32) @ [1 << 16, 1 << 8, 1]
     records["strength"], records["kind"] = edges.strength, edges.kind
-    field = types["sensor_msgs/msg/PointField"]
-    fields = [
-        field(name=name, offset=records.dtype.fields[name][1], datatype=UINT8 if code == "u1" else FLOAT32, count=1)  # pyright: ignore[reportOptionalSubscript]
-        for name, code in COLUMNS.items()
-    ]
+    field, offset, fields = types["sensor_msgs/msg/PointField"], 0, []
+    for name, code in COLUMNS.items():  # the bits of rgb stand in a float, as PCL has it
+        fields.append(field(name=name, offset=offset, datatype=UINT8 if code == "u1" else FLOAT32, count=1))
+        offset += np.dtype(code).itemsize
     return types["sensor_msgs/msg/PointCloud2"](
         header=header(types, facts),
         height=1,

@@ -57,11 +57,17 @@ def tool(*words: object) -> str:
     return run(sys.executable, "-m", *words)
 
 
+def find(pattern: str, text: str) -> str:
+    """Return what the first group of a pattern is in a text."""
+    found = re.search(pattern, text, re.M)
+    if not found:
+        raise SystemExit(f"{pattern} is not in:\n{text}")
+    return found[1]
+
+
 def version() -> str:
     """Version of the sources."""
-    found = re.search(r'^__version__ = "(.+)"$', (ROOT / "src/edgel/__init__.py").read_text(), re.M)
-    assert found
-    return found[1]
+    return find(r'^__version__ = "(.+)"$', (ROOT / "src/edgel/__init__.py").read_text())
 
 
 def wheel() -> Path:
@@ -77,7 +83,7 @@ def agree() -> None:
     said = {
         "CITATION.cff": yaml.safe_load((ROOT / "CITATION.cff").read_text())["version"],
         "packaging/recipe.yaml": recipe["context"]["version"],
-        "CHANGELOG.md": re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(), re.M)[1],  # pyright: ignore[reportOptionalSubscript]
+        "CHANGELOG.md": find(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text()),
     }
     wrong = [f"{name} says {number}" for name, number in said.items() if number != version()]
     known = set(PROJECT["urls"].values())
@@ -86,7 +92,7 @@ def agree() -> None:
         urls = re.findall(r"https://(?:github\.com|[\w.]*readthedocs\.io)/[^\s)\]>\"`]*", (ROOT / path).read_text())
         others = [url for url in urls if url not in known and not url.startswith((repository, pages))]
         wrong += [f"{path} has another address: {url}" for url in others]
-    needed = {re.match(r"[\w.-]+", row)[0]: row for row in PROJECT["dependencies"]}  # pyright: ignore[reportOptionalSubscript]
+    needed = {find(r"^([\w.-]+)", row): row for row in PROJECT["dependencies"]}
     listed = {row.split()[0]: row for row in recipe["requirements"]["run"]}
     for name, row in needed.items():
         least = row.split(">=")[1]
@@ -106,11 +112,10 @@ def packages() -> None:
     sdist = DIST / f"edgel-{version()}.tar.gz"
     tool("twine", "check", "--strict", wheel(), sdist)
     tool("check_wheel_contents", wheel())
-    rating = int(
-        re.search(r"Final rating: (\d+)/10", run(Path(sys.executable).with_name("pyroma"), "-n", "0", sdist))[1]
-    )  # pyright: ignore[reportOptionalSubscript]
+    rated = run(Path(sys.executable).with_name("pyroma"), "-n", "0", sdist)
+    rating = int(find(r"Final rating: (\d+)/10", rated))
     if rating < LEAST_RATING:
-        raise SystemExit(tool("pyroma", sdist))
+        raise SystemExit(rated)
     checksum = hashlib.sha256(sdist.read_bytes()).hexdigest()
     recipe = (ROOT / "packaging/recipe.yaml").read_text()
     (DIST / "recipe.yaml").write_text(recipe.replace("sha256: SHA256", f"sha256: {checksum}"))
@@ -207,8 +212,8 @@ def oldest() -> None:
 
 def notebooks() -> None:
     """The notebooks, from the first cell to the last."""
-    import nbclient
-    import nbformat
+    import nbclient  # pyright: ignore[reportMissingImports]
+    import nbformat  # pyright: ignore[reportMissingImports]
 
     for path in sorted((ROOT / "notebooks").glob("*.ipynb")):
         tell(f"notebooks/{path.name}")

@@ -11,6 +11,7 @@ import shlex
 import warnings
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -82,7 +83,8 @@ def record_clouds(path, xyz):
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS2_HUMBLE)
-    types, name = store.types, "sensor_msgs/msg/PointCloud2"
+    types: Any = store.types
+    name = "sensor_msgs/msg/PointCloud2"
     stamp = types["builtin_interfaces/msg/Time"](sec=1, nanosec=0)
     fields = [types["sensor_msgs/msg/PointField"](axis, 4 * i, 7, 1) for i, axis in enumerate("xyz")]
     data = xyz.astype(np.float32).view(np.uint8).ravel()

@@ -3,11 +3,14 @@
 import runpy
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import edgel
+from edgel._cli import app
 from edgel.io import FormatError, ros
 from edgel.plot.palette import kind_colors
 
@@ -37,7 +40,7 @@ def header(store, seconds):
 
 def cloud2(store, records, *, padding=0, big=False, stamp=5):
     """A PointCloud2 of records (N,) or (H, W), with some bytes after every row."""
-    records = np.atleast_2d(records)
+    records: Any = np.atleast_2d(records)
     field = store.types["sensor_msgs/msg/PointField"]
     fields = []
     for name in records.dtype.names:
@@ -98,7 +101,7 @@ def record(folder, kind, messages):
 def some_records(seed, shape=(40,), order="<"):
     layout = [("x", "f4"), ("y", "f4"), ("z", "f4"), ("rgb", "u4"), ("ring", "u2"), ("normal_x", "f4")]
     layout += [("normal_y", "f4"), ("normal_z", "f4"), ("history", "f4", (2,)), ("time", "f8")]
-    records = np.zeros(shape, [(name, order + code, *more) for name, code, *more in layout])
+    records: Any = np.zeros(shape, [(name, order + code, *more) for name, code, *more in layout])
     rng = np.random.default_rng(seed)
     for name in records.dtype.names:
         records[name] = rng.integers(1, 200, records[name].shape)
@@ -162,6 +165,18 @@ def test_depth_images_with_their_camera(tmp_path, kind, encoding, dtype, unit):
     expected = edgel.from_depth(depth.astype(float) * unit, (10.0, 10.0, 2.0, 1.5))
     np.testing.assert_allclose(cloud.xyz, expected.xyz, rtol=1e-12)
     assert cloud.shape == (3, 4)
+
+
+def test_the_command_line_takes_a_topic_and_a_message(tmp_path):
+    clouds = [some_records(seed) for seed in range(3)]
+    path = record(tmp_path, "mcap", lambda store: [("/a", cloud2(store, clouds[0])), ("/b", cloud2(store, clouds[1]))])
+    for words, found in ((["--topic", "/a"], clouds[0]), (["--topic", "/b:0"], clouds[1])):
+        result = CliRunner().invoke(app, ["convert", str(path), str(tmp_path / "copy.npy"), *words])
+        assert result.exit_code == 0, result.output
+        np.testing.assert_array_equal(edgel.read(tmp_path / "copy.npy").xyz[:, 1], found["y"])
+    result = CliRunner().invoke(app, ["info", str(path), "--topic", "/b:7"])
+    assert result.exit_code == 3
+    assert "no number 7" in result.output
 
 
 def test_big_endian_clouds(tmp_path):
@@ -231,6 +246,7 @@ def test_edges_and_lines_as_messages(tmp_path, monkeypatch):
     np.testing.assert_array_equal(colors, kind_colors(found.kind))
     curves = edgel.curves.trace(edgel.read(path), found)
     with AnyReader([tmp_path / "edges"]) as reader:
+        marker: Any
         (marker,) = [
             reader.deserialize(raw, one.msgtype) for one, _, raw in reader.messages() if one.topic == "/edge_lines"
         ]

@@ -73,6 +73,7 @@ def detect(
     intrinsics: options.Intrinsics = None,
     columns: options.Columns = None,
     sample_mesh: options.SampleMesh = None,
+    topic: options.Topic = None,
     label_all: Annotated[
         bool,
         options.own(
@@ -201,12 +202,13 @@ def detect(
         files.check_stdout(output, as_json=as_json)
         talk, tiling = Talk("detect", as_json, quiet, debug), tiles.Tiling(as_one, tile_points, scheduler, overwrite)
         if as_one:
-            refused = {"intrinsics": intrinsics, "columns": columns, "sample_mesh": sample_mesh, "where": where}
-            refused |= {"all": label_all, "report": report, "min_angle": min_angle, "crop": crop, "clobber": clobber}
+            refused = {"intrinsics": intrinsics, "columns": columns, "sample_mesh": sample_mesh, "topic": topic}
+            refused |= {"where": where, "all": label_all, "report": report, "min_angle": min_angle, "crop": crop}
+            refused |= {"clobber": clobber}
             tiles.detect_as_one(sources, output, output_format, method, given, refused, tiling, talk, workers)
             return
         tiling.check_unused()
-        reading = files.Reading(intrinsics, columns, sample_mesh)
+        reading = files.Reading(intrinsics, columns, sample_mesh, topic)
         wanted = _Wanted(reading, None if where is None else Where(where), method, given, min_angle, crop, label_all)
         extension = options.extension(output_format)
         todo = jobs.plan(sources, reading, output=output, extension=extension, report=report, clobber=clobber)

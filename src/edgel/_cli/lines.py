@@ -60,6 +60,7 @@ def lines(
     intrinsics: options.Intrinsics = None,
     columns: options.Columns = None,
     sample_mesh: options.SampleMesh = None,
+    topic: options.Topic = None,
     tolerance: Annotated[
         float | None,
         options.own(
@@ -102,7 +103,7 @@ def lines(
             raise Failure(ExitCode.USAGE, f"--simplify: expected a length of 0 or more, got {tolerance:g}")
         condition = None if where is None else Where(where)
         drawing: dict[str, Any] = {"view": view, "unit": unit, "scale": scale}
-        reading = files.Reading(intrinsics, columns, sample_mesh)
+        reading = files.Reading(intrinsics, columns, sample_mesh, topic)
         wanted = _Wanted(reading, condition, check_options("auto", given), tolerance, drawing)
         todo = jobs.plan(sources, reading, output=output, known=list(WRITERS), report=report, clobber=clobber)
         run_jobs(todo, partial(_draw, wanted), Talk("lines", as_json, quiet, debug), workers=workers)

@@ -195,20 +195,20 @@ def _choose(name: str, offered: dict[str, list[Any]], topic: str | None) -> str:
 def _cloud_of(name: str, message: Any) -> Cloud:
     """Make a cloud of a PointCloud2."""
     known = [field for field in message.fields if field.datatype in _TYPES and field.name]
-    formats = [_format_of(field, ">" if message.is_bigendian else "<") for field in known]
+    names: list[str] = [field.name for field in known]
     height, width, step, row = (int(getattr(message, key)) for key in ("height", "width", "point_step", "row_step"))
+    layout: Any = {"names": names, "offsets": [field.offset for field in known], "itemsize": step}
+    layout["formats"] = [_format_of(field, ">" if message.is_bigendian else "<") for field in known]
     with _refusing(name):
-        layout = {"names": [field.name for field in known], "formats": formats}
-        layout |= {"offsets": [field.offset for field in known], "itemsize": step}
         shape, strides = (height, width), (row or width * step, step)
-        records = np.ndarray(shape, np.dtype(layout), np.ascontiguousarray(message.data), strides=strides)
-        records = records.reshape(-1)
-    axes = find_xyz(records.dtype.names or ())
+        table = np.ndarray(shape, np.dtype(layout), np.ascontiguousarray(message.data), strides=strides)
+        records = table.reshape(-1)
+    axes = find_xyz(names)
     if axes is None:
-        raise FormatError(f"{name}: a PointCloud2 without x, y and z: {', '.join(map(printable, layout['names']))}")
-    spelled = {old: new for old, new in standard_names(layout["names"]).items() if new in NORMALS}
+        raise FormatError(f"{name}: a PointCloud2 without x, y and z: {', '.join(map(printable, names))}")
+    spelled = {old: new for old, new in standard_names(names).items() if new in NORMALS}
     attributes: dict[str, np.ndarray] = {}
-    for field in layout["names"]:
+    for field in names:
         values = records[field]
         if field in axes:
             continue
