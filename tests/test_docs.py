@@ -22,9 +22,9 @@ import edgel
 from edgel._cli import app
 
 ROOT = Path(__file__).parents[1]
-PAGES = [path for path in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))) if path.is_file()]
-if (ROOT / "mkdocs.yml").is_file():
-    PAGES += [ROOT / "CONTRIBUTING.md"]
+PARTS = {ROOT / "docs/benchmarks/pictures.md"}  # of a page that a program writes
+PAGES = [path for path in sorted((ROOT / "docs").rglob("*.md")) if path not in PARTS]
+PAGES += [path for path in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "SECURITY.md") if path.is_file()]
 ELSEWHERE = {
     "pip install": "make release-check installs the wheel",
     "python3 -m venv": "make release-check",
@@ -136,3 +136,35 @@ def test_python_blocks_name_what_they_need():
     for page in PAGES:
         kinds = re.findall(r"^ *```(\w+)", page.read_text(), re.M)
         assert set(kinds) <= {"python", "console", "text", "yaml", "toml"}, page
+
+
+def anchors(page):
+    """The anchors of a page's headings, as the site names them, and those it sets itself."""
+    text = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.M | re.S)
+    heads = [re.sub(r"\{.*\}|`", "", head).strip() for head in re.findall(r"^#+ (.+)$", text, re.M)]
+    slugs = {re.sub(r"[\s-]+", "-", re.sub(r"[^\w\s-]", "", head.lower())).strip("-") for head in heads}
+    own = set(re.findall(r"\{ #([\w-]+) \}", text))
+    return slugs | own | set(re.findall(r"^::: ([\w.]+)$", text, re.M))
+
+
+@pytest.mark.skipif(not (ROOT / "mkdocs.yml").is_file(), reason="the source distribution has no docs")
+def test_links_lead_somewhere():
+    """What make docs checks too, and what it does not see: links from the README and out of docs/."""
+    for page in PAGES:
+        text = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.M | re.S)
+        for target in re.findall(r"\]\(([^)\s]+)\)", text):
+            if re.match(r"https?:", target):
+                continue
+            file, _, anchor = target.partition("#")
+            there = (page.parent / file).resolve() if file else page
+            assert there.is_file(), f"{page}: {target}"
+            assert not anchor or anchor in anchors(there), f"{page}: {target}"
+
+
+@pytest.mark.skipif(not (ROOT / "mkdocs.yml").is_file(), reason="the source distribution has no docs")
+def test_every_page_is_in_the_menu():
+    menu = (ROOT / "mkdocs.yml").read_text()
+    for page in PAGES:
+        if page.is_relative_to(ROOT / "docs"):
+            name = page.relative_to(ROOT / "docs").as_posix()
+            assert f": {name}\n" in menu or f"/{name}\n" in menu, name
