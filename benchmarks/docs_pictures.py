@@ -44,13 +44,6 @@ def strength() -> None:
     beside("concepts-strength.png", *(plot.picture(cloud, one, size=PANEL, edge_color="strength") for one in looks))
 
 
-def scale() -> None:
-    soft = synth.prism([(0, 0), (60, 0), (60, 40), (0, 40)], height=20.0, fillets=[3.0, 3.0, 0.0, 0.0])
-    cloud = synth.sample(soft, pattern="blue_noise", spacing=0.8).cloud
-    looks = [edgel.detect(cloud), edgel.detect(cloud, max_scale=8)]
-    beside("concepts-scale.png", *(plot.picture(cloud, one, size=PANEL) for one in looks))
-
-
 def position() -> None:
     """A cut across the edge of a block: points, places on the edge, and how sure they are."""
     scene = synth.sample(synth.stepped_block(), pattern="blue_noise", spacing=0.8, noise=0.15)
@@ -87,7 +80,7 @@ def steps() -> None:
 
 if __name__ == "__main__":
     wanted = sys.argv[1:]
-    for make in (start, kinds, strength, scale, position, steps):
+    for make in (start, kinds, strength, position, steps):
         if wanted and make.__name__ not in wanted:
             continue
         make()
