@@ -120,7 +120,7 @@ def run_command(line):
 
 
 @pytest.mark.usefixtures("folder")
-@pytest.mark.parametrize("page", filter(blocks, PAGES), ids=lambda page: str(page.relative_to(ROOT)))
+@pytest.mark.parametrize("page", [*filter(blocks, PAGES)], ids=lambda page: str(page.relative_to(ROOT)))
 def test_every_block_runs(page):
     names = {"__name__": "__main__"}
     for kind, text, needs in blocks(page):

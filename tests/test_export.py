@@ -50,14 +50,15 @@ def test_a_notebook_shows_that_there_are_no_edges(edges):
     assert "<img" not in page
 
 
-def test_a_notebook_draws_with_viser_where_it_is(cloud, edges, monkeypatch):
+def test_a_notebook_draws_with_viser_where_it_is(cloud, edges, monkeypatch, capsys):
     """The page holds itself, and no server is left behind."""
     pytest.importorskip("viser")
     pytest.importorskip("IPython")
     before = {thread.name for thread in threading.enumerate()}
     monkeypatch.setitem(sys.modules, "ipykernel", sys)
     shown = edges.plot(points=cloud).data
-    assert shown.startswith("<iframe srcdoc=")
+    assert shown.startswith("<div><iframe srcdoc=")
+    assert capsys.readouterr().out == ""
     assert "&lt;html" in shown
     assert not {thread.name for thread in threading.enumerate() if "viser" in thread.name.lower()} - before
     monkeypatch.delitem(sys.modules, "ipykernel")

@@ -11,6 +11,7 @@ import importlib
 import importlib.util
 import io
 import sys
+from contextlib import redirect_stdout
 from dataclasses import replace
 from types import ModuleType
 from typing import Any
@@ -24,7 +25,7 @@ from edgel.plot import picture
 from edgel.plot.palette import KIND_COLORS, as_hex, kind_colors
 
 _SIZE = (640, 480)  # of the picture in a notebook, in pixels
-_DOT = 0.02  # of a point in viser, where the whole is 4 wide
+_WIDE, _DOT = 4.0, 0.02  # of the whole and of a point in viser, whose camera is made for things of some units
 _DRAWN = 20_000  # points of a cloud that Matplotlib draws behind its edges: more take long, and show no more
 
 
@@ -99,22 +100,20 @@ def _in_viser(edges: Edges, xyz: np.ndarray, _: Any) -> Any:
     from IPython.display import HTML
 
     viser = _optional("viser")
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    try:
-        places = np.concatenate([edges.position, xyz])
-        low, high = (places.min(axis=0), places.max(axis=0)) if len(places) else (np.zeros(3), np.ones(3))
-        size = float(max((high - low).max(), 1e-30)) / 4
-        for name, at, colors in (
-            ("cloud", xyz, np.full((len(xyz), 3), 200, np.uint8)),
-            ("edges", edges.position, kind_colors(edges.kind)),
-        ):
-            if len(at):
-                drawn = ((at - (low + high) / 2) / size).astype(np.float32)
+    places = np.concatenate([edges.position, xyz, np.zeros((0 if len(edges) + len(xyz) else 1, 3))])
+    low, high = places.min(axis=0), places.max(axis=0)
+    scale = _WIDE / float((high - low).max() or 1.0)
+    with redirect_stdout(io.StringIO()):  # its banner
+        server = viser.ViserServer("127.0.0.1", 0, verbose=False)
+        grey = np.full((len(xyz), 3), 200, np.uint8)
+        for name, at, colors in (("cloud", xyz, grey), ("edges", edges.position, kind_colors(edges.kind))):
+            drawn = ((at - (low + high) / 2) * scale).astype(np.float32)
+            if len(drawn):
                 server.scene.add_point_cloud(f"/{name}", drawn, colors, point_size=_DOT, precision="float32")
         page = html.escape(server.scene.as_html(), quote=True)
-    finally:
         server.stop()
-    return HTML(f'<iframe srcdoc="{page}" width="100%" height="480" title="The edge points" frameborder="0"></iframe>')
+    frame = f'<iframe srcdoc="{page}" width="100%" height="480" title="The edge points" frameborder="0"></iframe>'
+    return HTML(f"<div>{frame}</div>")
 
 
 def to_open3d(edges: Edges) -> Any:
