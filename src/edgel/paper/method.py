@@ -150,16 +150,9 @@ def detect(
     check_num_neighbors(num_neighbors, len(checked.xyz))
     check_scale(scale)
     if scale > 1:
-        options = {
-            "width": width,
-            "height": height,
-            "kernel_size": kernel_size,
-            "sigma": sigma,
-            "low": low,
-            "high": high,
-            "edge_map": edge_map,
-        }
-        options |= {"tolerance": tolerance, "gray_min": gray_min, "num_neighbors": num_neighbors}
+        options = {"width": width, "height": height, "kernel_size": kernel_size, "sigma": sigma}
+        options |= {"low": low, "high": high, "tolerance": tolerance, "gray_min": gray_min}
+        options |= {"num_neighbors": num_neighbors, "edge_map": edge_map}
         return at_scale(detect, points, scale, progress=progress, **options)
     stages = Stages(progress)
     with stages("projection"):
