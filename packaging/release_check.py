@@ -120,13 +120,15 @@ def packages() -> None:
 
 def interpreters() -> dict[str, str]:
     """Every supported Python that is here: version to program."""
+    versions = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv")) / "versions"
+    ask = "import sys; print(*sys.version_info[:2], sep='.')"
     found = {}
     for number in SUPPORTED:
-        words = [sys.executable, "-m", "uv", "python", "find", "--no-python-downloads", "--system", number]
-        done = subprocess.run(words, capture_output=True, text=True, check=False)
-        if done.returncode == 0:
-            found[number] = done.stdout.strip()
-        else:
+        for program in (shutil.which(f"python{number}"), *versions.glob(f"{number}.*/bin/python")):
+            # What pyenv leaves on the path for a version that is not chosen fails.
+            if program and subprocess.run([program, "-c", ask], capture_output=True, text=True).stdout == f"{number}\n":
+                found[number] = str(program)
+        if number not in found:
             print(f"   Python {number} is not here")
     if not found:
         raise SystemExit("no supported Python was found")
