@@ -198,13 +198,17 @@ def oldest() -> None:
     """The oldest versions that pyproject.toml allows, on the oldest Python."""
     tell("the oldest dependencies")
     found = interpreters()
+    number = min(found, key=lambda number: int(number.split(".")[1]))
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        run(found[min(found, key=lambda number: int(number.split(".")[1]))], "-m", "venv", folder / "venv")
+        run(found[number], "-m", "venv", folder / "venv")
         programs = folder / "venv" / ("Scripts" if os.name == "nt" else "bin")
+        # Of the sources: of a wheel only the wheel itself would be direct.
+        lowest = ("--quiet", "--resolution", "lowest-direct", "--python-version", number, "--extra", "view")
+        tool("uv", "pip", "compile", *lowest, "--output-file", folder / "lowest.txt", ROOT / "pyproject.toml")
         python = ("--python", programs / "python")
-        wanted = f"{wheel()}[view]"
-        tool("uv", "pip", "install", "--quiet", *python, "--resolution", "lowest-direct", wanted, "pytest>=8.2")
+        tool("uv", "pip", "install", "--quiet", *python, "--requirements", folder / "lowest.txt", "pytest>=8.2")
+        tool("uv", "pip", "install", "--quiet", *python, "--no-deps", wheel())
         print(tool("uv", "pip", "list", *python))
         run_pages(programs, folder, "-k", "README or start or research or depth-frames")
 
