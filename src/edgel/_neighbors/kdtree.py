@@ -70,13 +70,7 @@ class NeighborIndex:
 
         `total` is the number of points of the cloud that these are a part of, by default their own.
         """
-        total = len(self) if total is None else total
-        if total <= number:
-            return np.arange(len(self))
-        chosen = np.empty(len(self), np.bool_)
-        below = np.uint64(2**64 * number // total)
-        run_slices(_choose, len(self), self.xyz.view(np.uint64), below, chosen, size=65536)
-        return np.flatnonzero(chosen)
+        return np.flatnonzero(chosen(self.xyz, number, len(self) if total is None else total))
 
     def evenly_sampled(self, number: int) -> np.ndarray:
         """Return about `number` places, evenly sampled over the tree, whatever the order of the input."""
@@ -116,6 +110,17 @@ def build_index(xyz: np.ndarray) -> NeighborIndex:
     boxes[0] = 0.0
     _inner_boxes(1 << depth, boxes)
     return NeighborIndex(here[1], here[0], boxes, blocks)
+
+
+def chosen(xyz: np.ndarray, number: int, total: int) -> np.ndarray:
+    """Choose about `number` of `total` points, of which these are (3, N) float64, by a hash of the coordinates alone.
+
+    Returns (N,) bool; all where there are no more. A smaller number chooses some of the same.
+    """
+    some = np.ones(xyz.shape[1], np.bool_)
+    if total > number:
+        run_slices(_choose, len(some), xyz.view(np.uint64), np.uint64(2**64 * number // total), some, size=65536)
+    return some
 
 
 @kernel

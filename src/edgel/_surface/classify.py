@@ -38,9 +38,15 @@ class Classification:
         return Classification(self.points[some], self.crease[some], self.outline[some], self.evidence.take(some))
 
 
-def classify(index: NeighborIndex, screening: Screening) -> Classification:
-    """Classify the candidates of a screening by their own evidence, and the likely ones again by their context."""
+def classify(index: NeighborIndex, screening: Screening, asked: np.ndarray | None = None) -> Classification:
+    """Classify the candidates of a screening by their own evidence, and the likely ones again by their context.
+
+    Those at some places alone, `asked` (N,) bool, where these are given: what is said at one of them is the same as
+    long as all candidates among those nearest to it are asked for too (`edgel._surface.reach.with_context_of`).
+    """
     trees, candidates = load_forests(), screening.candidates
+    if asked is not None:
+        candidates = candidates[asked[candidates]]
     kept, parts, probabilities = [], [], []
     for start in range(0, len(candidates), _BLOCK):
         places = candidates[start : start + _BLOCK]

@@ -18,6 +18,7 @@ AROUND = 16  # neighbours whose middle says on which side the surface lies
 COUNTS = (7, 17)  # outermost points of each fit; that which is surest of its position is taken
 POSITION, LINE, STD = 0, 3, 6
 RIM = 7
+OUTWARD = 5  # columns of `find_outward`
 
 _TERMS = 3  # 1, s along the rim, s^2 / 2
 _CURVATURE = 0.3  # of a rim, in 1 / spacing: standard deviation of what is expected of all
@@ -28,22 +29,43 @@ _DEPTH = 1.25  # of outermost points inside the true end, over their spread: mea
 _ASIDE = 2.0  # spacings from the line: farther ones belong to another rim
 
 
-def find_rims(
-    index: NeighborIndex, points: np.ndarray, outermost: np.ndarray, normals: np.ndarray, noise: np.ndarray
-) -> np.ndarray:
-    """Fit a line with a bend to the outermost points around some.
+def find_outward(index: NeighborIndex, points: np.ndarray, normals: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    """Say on which side of some points the surface ends.
 
     Parameters
     ----------
     index : NeighborIndex
     points : (M,) int64
         Ascending.
+    normals : (M, 3) float64
+        Of the surface there, of either sign.
+    noise : (M,) float64
+        Standard deviation of the points off it, in the cloud's unit.
+
+    Returns
+    -------
+    (M, 5) float64
+        The unit vector along the surface away from it (NaN where there is none), the spacing, and the noise in it.
+    """
+    across = np.full((len(points), OUTWARD), np.nan)
+    if len(points):
+        k = min(AROUND, len(index))
+        visit_neighbors(_find_across, at_points(index, points), index, k, normals, noise, across)
+    return across
+
+
+def fit_rims(xyz: np.ndarray, outermost: np.ndarray, normals: np.ndarray, across: np.ndarray) -> np.ndarray:
+    """Fit a line with a bend to the outermost points around some.
+
+    Parameters
+    ----------
+    xyz : (M, 3) float64
     outermost : (K, 3) float64
         The points that surely are where the surface ends.
     normals : (M, 3) float64
         Of the surface there.
-    noise : (M,) float64
-        Standard deviation of the points off it, in the cloud's unit.
+    across : (M, 5) float64
+        See `find_outward`.
 
     Returns
     -------
@@ -51,13 +73,10 @@ def find_rims(
         Place on the rim relative to the point, unit tangent, and the standard deviation of the place across the
         tangent; NaN where there are too few points, or no normal.
     """
-    rims, across = np.full((len(points), RIM), np.nan), np.full((len(points), 5), np.nan)
-    if len(points) and len(outermost) >= COUNTS[0]:
-        k = min(AROUND, len(index))
-        visit_neighbors(_find_across, at_points(index, points), index, k, normals, noise, across)
-        alone, queries = build_index(outermost), anywhere(index.at(index.places_of(points)))
+    rims = np.full((len(xyz), RIM), np.nan)
+    if len(xyz) and len(outermost) >= COUNTS[0]:
         k = min(COUNTS[-1], len(outermost))
-        visit_neighbors(_fit_rims, queries, alone, k, normals, across, rims)
+        visit_neighbors(_fit_rims, anywhere(xyz), build_index(outermost), k, normals, across, rims)
     return rims
 
 
