@@ -160,13 +160,13 @@ def environment(folder: Path, python: str, *wanted: str) -> Path:
 
 def serve(program: Path, folder: Path) -> None:
     """Start the viewer and get its page."""
-    words = [program, "view", "demo/tee.ply", "--no-browser", "--port", "0"]
+    words = [program, "view", "demo/tee.ply", "--no-browser"]
     with subprocess.Popen(words, cwd=folder, text=True, stdout=-1, stderr=subprocess.STDOUT) as viewer:
         assert viewer.stdout
         try:
             begin = time.monotonic()
             for line in viewer.stdout:
-                if found := re.search(r"http://\S+", line):
+                if found := re.search(r"http://\S+/", line):
                     with urllib.request.urlopen(found[0], timeout=SERVED) as page:
                         assert page.status == 200
                     return
