@@ -239,9 +239,10 @@ def main(words: Sequence[str] | None = None) -> None:
     """Run the steps asked for, or all."""
     parser = argparse.ArgumentParser(description="All that a release must hold.")
     parser.add_argument("steps", nargs="*", help=f"some of: {', '.join(STEPS)} (default: all)")
-    for step in parser.parse_args(words).steps or STEPS:
+    chosen = parser.parse_args(words).steps
+    for step in chosen or STEPS:
         STEPS[step]()
-    tell(f"edgel {version()} may be released: {DIST}")
+    tell(f"held: {', '.join(chosen)}" if chosen else f"edgel {version()} may be released: {DIST}")
 
 
 if __name__ == "__main__":
