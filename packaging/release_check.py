@@ -141,7 +141,7 @@ def bare() -> None:
         tell(f"Python {number}: a bare environment")
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
-            programs = environment(folder, python, f"{wheel()}[view]")
+            programs = environment(folder, python, f"{wheel()}[plot,view]")
             run(programs / "edgel", "demo", "-o", "demo", cwd=folder)
             run(programs / "edgel", "detect", "demo/tee.ply", "-o", "edges.ply", cwd=folder)
             real = ROOT / "benchmarks/real/vlp16_pose09.npz"
@@ -183,7 +183,7 @@ def pages() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         number, python = next(iter(interpreters().items()))
-        programs = environment(folder, python, f"{wheel()}[export,lines,ros,view]", "pytest")
+        programs = environment(folder, python, f"{wheel()}[export,lines,plot,ros,view]", "pytest")
         tell(f"Python {number}: blocks of README.md and docs/")
         run_pages(programs, folder)
 
@@ -204,7 +204,17 @@ def oldest() -> None:
         run(found[number], "-m", "venv", folder / "venv")
         programs = folder / "venv" / ("Scripts" if os.name == "nt" else "bin")
         # Of the sources: of a wheel only the wheel itself would be direct.
-        lowest = ("--quiet", "--resolution", "lowest-direct", "--python-version", number, "--extra", "view")
+        lowest = (
+            "--quiet",
+            "--resolution",
+            "lowest-direct",
+            "--python-version",
+            number,
+            "--extra",
+            "view",
+            "--extra",
+            "plot",
+        )
         tool("uv", "pip", "compile", *lowest, "--output-file", folder / "lowest.txt", ROOT / "pyproject.toml")
         python = ("--python", programs / "python")
         tool("uv", "pip", "install", "--quiet", *python, "--requirements", folder / "lowest.txt", "pytest>=8.2")

@@ -34,6 +34,7 @@ ELSEWHERE = {
     "make ": ".ci/run, make release-check",
     "git ": "it changes the checkout, or needs the network",
     "dask ": "a cluster; tests/tiled",
+    "edgel warmup": "it compiles everything; tests/kernels",
     "edgel demo": "tests/demo, make release-check",
     "edgel view": "waits for a browser; tests/viewer",
 }

@@ -67,7 +67,10 @@ def draw(edges: Edges, axes: Any, points: Any, backend: str) -> Any:
 
 
 def _in_matplotlib(edges: Edges, xyz: np.ndarray, axes: Any) -> Any:
-    from matplotlib import pyplot
+    try:
+        from matplotlib import pyplot
+    except ImportError as error:
+        raise ImportError("plot() needs Matplotlib: pip install 'edgel[plot]', or pip install matplotlib") from error
 
     axes = pyplot.figure().add_subplot(projection="3d") if axes is None else axes
     count = 3 if hasattr(axes, "get_zlim") else 2

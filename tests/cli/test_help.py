@@ -18,7 +18,7 @@ import edgel
 from edgel import io
 from edgel._cli import app
 
-COMMANDS = ("detect", "view", "normals", "info", "convert", "render", "lines", "demo")
+COMMANDS = ("detect", "view", "normals", "info", "convert", "render", "lines", "demo", "warmup")
 ROOT = Path(__file__).parents[2]
 FACE = "facet normal 0 0 0\nouter loop\nvertex {}\nvertex {}\nvertex {}\nendloop\nendfacet\n"
 CORNER = FACE.format("0 0 0", "1 0 0", "0 1 0") + FACE.format("0 0 0", "0 1 0", "0 0 1")
@@ -82,7 +82,11 @@ def folder(tmp_path_factory):
 SHOWN = [line for command in COMMANDS for line in examples(run(command, "--help").stdout)]
 if (ROOT / "docs" / "command-line.md").is_file():
     SHOWN += re.findall(r"^\| `(edgel .+?)` \|", (ROOT / "docs" / "command-line.md").read_text(), re.MULTILINE)
-LONG = ("edgel view", "edgel demo")  # they wait for someone, or take half a minute; each has tests of its own
+LONG = (
+    "edgel view",
+    "edgel demo",
+    "edgel warmup",
+)  # they wait for someone, or take half a minute; each has tests of its own
 TRIED = [line for line in dict.fromkeys(SHOWN) if not line.startswith(LONG)]
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel, run_slices
+from edgel._kernels.parallel import kernel, routine, run_slices
 from edgel._kernels.simd import LANES, larger, largest_of, load, smaller, smallest_of, spread
 from edgel._neighbors.selection import sort_leaf, sort_places, value_at
 
@@ -179,7 +179,7 @@ def node_start(number, count, nodes):
     return min(number * ((count + LANES - 1) // LANES) // nodes * LANES, count)
 
 
-@kernel
+@routine
 def _extent(values, first, last):
     """Smallest and largest of values[first:last]."""
     low, high = spread(np.inf), spread(-np.inf)
@@ -193,7 +193,7 @@ def _extent(values, first, last):
     return least, most
 
 
-@kernel
+@routine
 def _box(xyz, first, last, box):
     """Lower and upper corner of the places first..last-1; returns the widest axis."""
     widest = 0
@@ -204,7 +204,7 @@ def _box(xyz, first, last, box):
     return widest
 
 
-@kernel
+@routine
 def _split_node(node, level, xyz, order, to_xyz, to_order, scratch, box):
     """Halve a node at the median of its widest axis, from one pair of arrays into the other."""
     count, nodes = xyz.shape[1], 1 << level
@@ -233,7 +233,7 @@ def _split_node(node, level, xyz, order, to_xyz, to_order, scratch, box):
         sort_places(to_key, to_second, to_third, to_order, left, tied)
 
 
-@kernel
+@routine
 def _make_scratch(node, count, nodes):
     """Make a scratch buffer for the keys of a node, and some more to fill up eights."""
     return np.empty(node_start(node + 1, count, nodes) - node_start(node, count, nodes) + LANES + BUCKET)

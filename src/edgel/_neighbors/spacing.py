@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from edgel._kernels.grid import cell_of
-from edgel._kernels.parallel import kernel, run_slices
+from edgel._kernels.parallel import kernel, routine, run_slices
 from edgel._neighbors.kdtree import NeighborIndex, build_index
 from edgel._neighbors.knn import knn
 from edgel._neighbors.queries import at_places
@@ -26,7 +26,7 @@ _CELLS = 2**24  # along an axis, at most, unless there are more points
 _PER_CELL = 8  # points in a cell, so that covered area is counted well
 
 
-@kernel
+@routine
 def disc_spacing(squared):
     """Root of the area a point stands for, from the disc that its 16 nearest fill; takes their squared distances."""
     k = min(len(squared), DISC)

@@ -95,9 +95,9 @@ def even_probability(counts: np.ndarray) -> float:
     none of them sure. Where it would be lower than that there are no edges to speak of, and what is found has to be as
     sure as elsewhere. Takes the `histogram` of all probabilities.
     """
-    falling = counts[::-1]
-    hits = np.cumsum(falling * ((np.arange(BINS)[::-1] + 0.5) / BINS))
-    expected = hits / np.maximum(np.cumsum(falling) + hits[-1], 1e-300)
+    bins = np.flatnonzero(counts)[::-1]
+    hits = np.cumsum(counts[bins] * ((bins + 0.5) / BINS))
+    expected = hits / (np.cumsum(counts[bins]) + hits[-1:])
     even = round(float(expected.max(initial=0.0)) / _STEP) * _STEP
     return min(even, EVEN[1]) if even >= EVEN[0] else SURE
 

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
+from edgel._kernels.arrays import copy_to, divide_rows, multiply
 from edgel._kernels.cholesky import explain, factorize, solve, variance_of
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import kernel, routine
 from edgel._neighbors.kdtree import NeighborIndex, build_index
 from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.neighborhood import relative
@@ -89,7 +90,10 @@ def _find_across(first, places, squared, queries, targets, xyz, normals, noise, 
         relative(places[q], queries, first + q, xyz, vectors)
         normal, out = normals[row], across[row]
         for axis in range(3):
-            out[axis] = -vectors[axis].mean()
+            total = 0.0
+            for i in range(vectors.shape[1]):
+                total += vectors[axis, i]
+            out[axis] = -total / vectors.shape[1]
         height = out[0] * normal[0] + out[1] * normal[1] + out[2] * normal[2]
         for axis in range(3):
             out[axis] -= height * normal[axis]
@@ -97,7 +101,8 @@ def _find_across(first, places, squared, queries, targets, xyz, normals, noise, 
         out[3] = disc_spacing(squared[q])
         out[4] = noise[row] / out[3] if out[3] > 0.0 else 0.0
         if length > 1e-6 * out[3]:
-            out[:3] /= length
+            for axis in range(3):
+                out[axis] /= length
         else:
             out[:3] = np.nan
 
@@ -113,18 +118,19 @@ def _fit_rims(first, places, squared, queries, targets, xyz, normals, across, ri
         if not (spacing > 0.0 and math.isfinite(across[row, 0]) and math.isfinite(normals[row, 0])):
             continue
         relative(places[q], queries, first + q, xyz, vectors)
-        vectors /= spacing
+        divide_rows(vectors, spacing)
         least = np.inf
         for count in COUNTS:
             if count > places.shape[1]:
                 break
             if _fit(vectors[:, :count], normals[row], across[row], scratch, found) and found[STD] < least:
-                best[:], least = found, found[STD]
-        best[POSITION : POSITION + 3] *= spacing
+                copy_to(found, best)
+                least = found[STD]
+        multiply(best, POSITION, POSITION + 3, spacing)
         best[STD] *= spacing
 
 
-@kernel
+@routine
 def _fit(vectors, normal, outward, scratch, rim):
     """Fit a line to points (3, K), in spacings, straight at first, then bent, each along the one before."""
     matrix, lower, inverse, right, along, line = scratch

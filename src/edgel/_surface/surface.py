@@ -78,6 +78,13 @@ class Surface:
         with self._stages("classification"):
             return classify(index, screening)
 
+    def probabilities(self) -> np.ndarray:
+        """How likely a crease and an outline are at every point, (N, 2), by the most that the detector asks of it."""
+        index, screening, every = self.smoothed, self.screening, np.zeros((2, len(self.xyz)))
+        with self._stages("classification"):
+            classify(index, screening, every=every)
+        return every.T
+
     @cached_property
     def _own_strengths(self) -> Strengths:
         """How marked the edges are by their own neighbours."""

@@ -112,7 +112,7 @@ def start(workers: int, scheduler: str | None, progress: Callable[[str], None]) 
             threads_per_worker=1,
             processes=True,
             memory_limit=0,
-            dashboard_address=None,  # pyright: ignore[reportArgumentType] - its way to have none
+            dashboard_address=":0",  # any port: another run may have the usual one
             env={"EDGEL_NUM_THREADS": str(threads)},
         ) as cluster,
         Client(cluster) as client,
