@@ -4,7 +4,7 @@ VENV := .venv
 LOCK := --no-emit-index-url --no-header --python-version 3.11
 BIN := $(VENV)/bin
 
-.PHONY: demo test checked lint bench bench-quick install lock clean
+.PHONY: demo test checked lint docs docs-serve release-check bench bench-quick install lock clean
 
 demo: install
 	$(BIN)/edgel demo -o demo
@@ -20,6 +20,21 @@ lint: install
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
+
+# The pages as a site, in site/; a warning is an error.
+docs: $(VENV)/installed-release
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
+docs-serve: $(VENV)/installed-release
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs serve
+
+# All that a release must hold; packages to upload lie in dist/ then. It needs the network, and half an hour.
+release-check: docs
+	$(BIN)/python packaging/release_check.py
+
+$(VENV)/installed-release: $(VENV)/installed requirements-release.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --requirement requirements-release.lock
+	touch $@
 
 # The benchmark needs more (Open3D and build123d are large); PCL and CGAL come from Debian, build.sh says how.
 bench: $(VENV)/installed-bench
@@ -46,7 +61,8 @@ $(VENV)/installed: pyproject.toml requirements.lock
 lock:
 	$(BIN)/python -m pip install --quiet uv
 	$(BIN)/uv pip compile --universal --upgrade --extra dev --extra e57 $(LOCK) --output-file requirements.lock pyproject.toml
+	$(BIN)/uv pip compile --universal --upgrade --extra docs --extra release --constraint requirements.lock $(LOCK) --output-file requirements-release.lock pyproject.toml
 	$(BIN)/uv pip compile --universal --upgrade --extra bench --constraint requirements.lock $(LOCK) --output-file requirements-bench.lock pyproject.toml
 
 clean:
-	rm -rf $(VENV) demo
+	rm -rf $(VENV) demo site dist

@@ -5,6 +5,7 @@ import io
 import pickle
 import re
 import sys
+import threading
 
 import numpy as np
 import pytest
@@ -47,6 +48,28 @@ def test_a_notebook_shows_that_there_are_no_edges(edges):
     page = edges.take(np.empty(0, int))._repr_html_()
     assert "0 of 1,200 points" in page
     assert "<img" not in page
+
+
+def test_a_notebook_draws_with_viser_where_it_is(cloud, edges, monkeypatch, capsys):
+    """The page holds itself, and no server is left behind."""
+    pytest.importorskip("viser")
+    pytest.importorskip("IPython")
+    before = {thread.name for thread in threading.enumerate()}
+    monkeypatch.setitem(sys.modules, "ipykernel", sys)
+    shown = edges.plot(points=cloud).data
+    assert shown.startswith("<div><iframe srcdoc=")
+    assert capsys.readouterr().out == ""
+    assert "&lt;html" in shown
+    assert not {thread.name for thread in threading.enumerate() if "viser" in thread.name.lower()} - before
+    monkeypatch.delitem(sys.modules, "ipykernel")
+    assert hasattr(edges.plot(), "get_zlim")
+
+
+def test_other_backends_are_checked(edges):
+    with pytest.raises(ValueError, match="backend: expected auto, matplotlib, pyvista, viser"):
+        edges.plot(backend="plotly")
+    with pytest.raises(ValueError, match="leave them out for viser"):
+        edges.plot(object(), backend="viser")
 
 
 def test_edges_keep_no_cloud(edges):

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from edgel.edges import EdgeKind, Edges
     from edgel.io import FormatError, FormatWarning, read, write
 
-__version__ = "0.1.0.dev0"
+__version__ = "0.1.0"
 
 __all__ = [
     "Cloud",

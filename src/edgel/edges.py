@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 
@@ -209,14 +209,40 @@ class Edges:
         cloud = as_cloud(points)
         return make_room(cloud, FIRST_COLUMNS).with_attributes(**self._describe(len(cloud), self.index))
 
-    def plot(self, axes: Any = None, *, points: Any = None) -> Any:
-        """Scatter the edge points by kind in Matplotlib `axes` (3D unless given) and return them.
+    def plot(
+        self,
+        axes: Any = None,
+        *,
+        points: Any = None,
+        backend: Literal["auto", "matplotlib", "pyvista", "viser"] = "auto",
+    ) -> Any:
+        """Draw the edge points by kind, in 3D unless `axes` say otherwise.
 
-        In 2D axes x and y are drawn. `points` are drawn in grey behind; `edgel.plot.picture` hides what they hide.
+        Parameters
+        ----------
+        axes : matplotlib axes, optional
+            Where to draw; in 2D axes x and y are drawn.
+        points : (N, 3) or (H, W, 3) array_like, Cloud, or an object that carries points, optional
+            Drawn in grey behind, at most 20,000 of them; `edgel.plot.picture` hides what they hide.
+        backend : {"auto", "matplotlib", "pyvista", "viser"}
+            What draws. "auto" is viser in a notebook where it is installed, to be turned with the mouse, and Matplotlib
+            elsewhere.
+
+        Returns
+        -------
+        matplotlib.axes.Axes, pyvista.Plotter, or what a notebook shows
+            As the backend says. A plotter waits for its ``show()``.
+
+        Raises
+        ------
+        ImportError
+            If the backend is not installed.
+        ValueError
+            If there is no such backend, or axes are given to another than Matplotlib.
         """
         from edgel import export  # it lies above: drawing knows edges, finding them knows no drawing
 
-        return export.draw(self, axes, points)
+        return export.draw(self, axes, points, backend)
 
     def to_open3d(self) -> Any:
         """Return an Open3D point cloud of `position`, with the first normal and the color of the kind."""

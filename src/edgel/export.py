@@ -8,7 +8,10 @@ from __future__ import annotations
 import base64
 import html
 import importlib
+import importlib.util
 import io
+import sys
+from contextlib import redirect_stdout
 from dataclasses import replace
 from types import ModuleType
 from typing import Any
@@ -22,6 +25,7 @@ from edgel.plot import picture
 from edgel.plot.palette import KIND_COLORS, as_hex, kind_colors
 
 _SIZE = (640, 480)  # of the picture in a notebook, in pixels
+_WIDE, _DOT = 4.0, 0.02  # of the whole and of a point in viser, whose camera is made for things of some units
 _DRAWN = 20_000  # points of a cloud that Matplotlib draws behind its edges: more take long, and show no more
 
 
@@ -44,8 +48,25 @@ def as_html(edges: Edges) -> str:
     return f'{shown}{table}<img src="data:image/png;base64,{image}" alt="The edge points"><p>{note}</p></div>'
 
 
-def draw(edges: Edges, axes: Any, points: Any) -> Any:
-    """Scatter edges in Matplotlib axes; see `Edges.plot`."""
+def draw(edges: Edges, axes: Any, points: Any, backend: str) -> Any:
+    """Draw edges by Matplotlib, PyVista or viser; see `Edges.plot`."""
+    drawn_by = {"matplotlib": _in_matplotlib, "pyvista": _in_pyvista, "viser": _in_viser}
+    if backend == "auto":
+        interactive = axes is None and "ipykernel" in sys.modules and importlib.util.find_spec("viser") is not None
+        backend = "viser" if interactive else "matplotlib"
+    if backend not in drawn_by:
+        raise ValueError(f"backend: expected auto, {', '.join(drawn_by)}, got {backend!r:.40}")
+    if axes is not None and backend != "matplotlib":
+        raise ValueError(f"axes: are Matplotlib's; leave them out for {backend}")
+    xyz = np.empty((0, 3))
+    if points is not None:
+        xyz = check_points(points, minimum=1).xyz
+        if len(xyz) > _DRAWN:
+            xyz = xyz[np.sort(np.random.default_rng(0).choice(len(xyz), _DRAWN, replace=False))]
+    return drawn_by[backend](edges, xyz, axes)
+
+
+def _in_matplotlib(edges: Edges, xyz: np.ndarray, axes: Any) -> Any:
     try:
         from matplotlib import pyplot
     except ImportError as error:
@@ -53,10 +74,7 @@ def draw(edges: Edges, axes: Any, points: Any) -> Any:
 
     axes = pyplot.figure().add_subplot(projection="3d") if axes is None else axes
     count = 3 if hasattr(axes, "get_zlim") else 2
-    if points is not None:
-        xyz = check_points(points, minimum=1).xyz
-        if len(xyz) > _DRAWN:
-            xyz = xyz[np.sort(np.random.default_rng(0).choice(len(xyz), _DRAWN, replace=False))]
+    if len(xyz):
         axes.scatter(*xyz.T[:count], s=0.5, color="0.8", linewidths=0)
     first = np.select([(edges.kind & int(kind)) > 0 for kind in KIND_COLORS], [int(kind) for kind in KIND_COLORS])
     for kind, color in KIND_COLORS.items():
@@ -69,6 +87,36 @@ def draw(edges: Edges, axes: Any, points: Any) -> Any:
     if len(edges):
         axes.legend(markerscale=3)
     return axes
+
+
+def _in_pyvista(edges: Edges, xyz: np.ndarray, _: Any) -> Any:
+    plotter = _optional("pyvista").Plotter()
+    if len(xyz):
+        plotter.add_points(xyz, color="lightgrey", point_size=2)
+    if len(edges):
+        plotter.add_points(to_pyvista(edges), scalars="rgb", rgb=True, point_size=5)
+    return plotter
+
+
+def _in_viser(edges: Edges, xyz: np.ndarray, _: Any) -> Any:
+    """A page of its own within the notebook's: nothing listens once it is made."""
+    from IPython.display import HTML
+
+    viser = _optional("viser")
+    places = np.concatenate([edges.position, xyz, np.zeros((0 if len(edges) + len(xyz) else 1, 3))])
+    low, high = places.min(axis=0), places.max(axis=0)
+    scale = _WIDE / float((high - low).max() or 1.0)
+    with redirect_stdout(io.StringIO()):  # its banner
+        server = viser.ViserServer("127.0.0.1", 0, verbose=False)
+        grey = np.full((len(xyz), 3), 200, np.uint8)
+        for name, at, colors in (("cloud", xyz, grey), ("edges", edges.position, kind_colors(edges.kind))):
+            drawn = ((at - (low + high) / 2) * scale).astype(np.float32)
+            if len(drawn):
+                server.scene.add_point_cloud(f"/{name}", drawn, colors, point_size=_DOT, precision="float32")
+        page = html.escape(server.scene.as_html(), quote=True)
+        server.stop()
+    frame = f'<iframe srcdoc="{page}" width="100%" height="480" title="The edge points" frameborder="0"></iframe>'
+    return HTML(f"<div>{frame}</div>")
 
 
 def to_open3d(edges: Edges) -> Any:

@@ -139,6 +139,43 @@ def test_order_of_the_points_and_threads_change_nothing(scan, monkeypatch):
     np.testing.assert_array_equal(shuffled.strength[back], expected.strength)
 
 
+def test_the_image_of_every_step_is_kept():
+    x, y = np.meshgrid(np.linspace(0, 10, 150), np.linspace(0, 10, 150))
+    points = np.c_[x.ravel(), y.ravel(), (x.ravel() > 6) * 3.0]
+    found = paper.detect(points, low=30.0, high=90.0)
+    steps = (found.projection, found.image, found.smoothed, found.gradient, found.thinned, found.edge_map)
+    assert {step.shape for step in steps} == {(found.grid.height + 2, found.grid.width + 2)}
+    np.testing.assert_array_equal(np.isnan(found.projection), found.image == 0)
+    assert np.nanmax(found.projection) == 3.0
+    kept = found.thinned > 0
+    np.testing.assert_array_equal(found.thinned[kept], found.gradient[kept])
+    assert found.thinned[found.edge_map].min() > 30.0
+    assert found.edge_map[found.thinned > 90.0].all()
+    assert found.smoothed.max() <= found.image.max()
+
+
+def test_an_edge_map_of_the_users_own_takes_the_place_of_cannys():
+    x, y = np.meshgrid(np.linspace(0, 10, 150), np.linspace(0, 10, 150))
+    points = np.c_[x.ravel(), y.ravel(), (x.ravel() > 6) * 3.0]
+    ours = paper.detect(points)
+    again = paper.detect(points, edge_map=ours.edge_map.astype(np.uint8))
+    for name in ("index", "strength", "normals", "edge_map", "thinned"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(ours, name))
+    assert "given" in again.reason
+    assert "low" not in again.parameters
+    own = np.zeros_like(ours.edge_map)
+    own[10, 20] = True
+    (left, _, low, _), (wide, high) = ours.grid.extent, ours.grid.pixel
+    few = paper.detect(points, edge_map=own, tolerance=0.6)
+    corner = left + 20 * wide, low + 10 * high
+    expected = (abs(points[:, 0] - corner[0]) < 0.6) & (abs(points[:, 1] - corner[1]) < 0.6)
+    np.testing.assert_array_equal(few.index, np.flatnonzero(expected))
+    assert len(paper.detect(points, edge_map=np.zeros_like(own))) == 0
+    for wrong in (own[1:], own.astype(float), "map"):
+        with pytest.raises(ValueError, match="edge_map: expected bool of shape"):
+            paper.detect(points, edge_map=wrong)
+
+
 def test_a_step_is_found_where_it_is():
     x, y = np.meshgrid(np.linspace(0, 10, 300), np.linspace(0, 10, 300))
     points = np.c_[x.ravel(), y.ravel(), (x.ravel() > 6) * 3.0]

@@ -8,7 +8,7 @@ from by_hand import edges_at
 from PIL import Image
 
 from edgel import Cloud
-from edgel._report.figures.published import figure_1, figure_5
+from edgel._report.figures.published import cloud_and_projection, normals_at_edges
 from edgel._report.figures.views import strongest
 from edgel.plot.camera import Viewport
 from edgel.plot.zbuffer import ZBuffer
@@ -38,21 +38,20 @@ def test_figure_3_shows_the_edge_map_upright(written):
 
 
 @pytest.mark.usefixtures("small")
-def test_figure_1_shows_the_part_beside_the_cloud(tee):
-    with_part = figure_1(tee.cloud, tee.edges, "tee", tee.part)
+def test_the_part_stands_beside_the_cloud(tee):
+    with_part = cloud_and_projection(tee.cloud, tee.edges, tee.part)
     assert [panel.title for panel in with_part.panels] == ["(a) the part", "(b) the cloud", "(c) its projection"]
     part, cloud = ((panel.image("light") < 255).any(axis=2).mean() for panel in with_part.panels[:2])
     assert part > 0.4
-    without = figure_1(tee.cloud, tee.edges, "tee", None)
+    without = cloud_and_projection(tee.cloud, tee.edges, None)
     assert [panel.title for panel in without.panels] == ["(a) the cloud", "(b) its projection"]
-    alone = figure_1(tee.cloud, tee.other, "tee", None)
-    assert [panel.title for panel in alone.panels] == [""]
+    assert cloud_and_projection(tee.cloud, tee.other, None) is None
     assert cloud < (without.panels[0].image("light") < 255).any(axis=2).mean()  # there its points are drawn singly
 
 
-def test_figure_5_points_along_the_normals(tee):
+def test_arrows_point_along_the_normals(tee):
     edges = replace(tee.edges, normals=np.full_like(tee.edges.normals, np.nan))
-    (with_arrows,), (without,) = (figure_5(tee.cloud, one, "tee").panels for one in (tee.edges, edges))
+    (with_arrows,), (without,) = (normals_at_edges(tee.cloud, one).panels for one in (tee.edges, edges))
     ink = [(panel.image("light").max(axis=2) < 60).sum() for panel in (with_arrows, without)]
     assert ink[0] > 3 * ink[1]
-    assert f"{len(edges):,} edge points have no normal" in figure_5(tee.cloud, edges, "tee").caption
+    assert f"{len(edges):,} edge points have no normal" in normals_at_edges(tee.cloud, edges).caption

@@ -48,6 +48,7 @@ def convert(
     intrinsics: options.Intrinsics = None,
     columns: options.Columns = None,
     sample_mesh: options.SampleMesh = None,
+    topic: options.Topic = None,
     output_format: options.Format = None,
     check: Annotated[
         bool,
@@ -64,7 +65,7 @@ def convert(
     """Convert clouds from any format to any other."""
     with exit_codes(as_json=as_json, debug=debug):
         files.check_stdout(output, as_json=as_json)
-        reading = files.Reading(intrinsics, columns, sample_mesh)
+        reading = files.Reading(intrinsics, columns, sample_mesh, topic)
         wanted = _Wanted(reading, None if where is None else Where(where), check)
         extension = options.extension(output_format)
         todo = jobs.plan(sources, reading, output=output, extension=extension, clobber=clobber)

@@ -73,6 +73,7 @@ def detect(
     intrinsics: options.Intrinsics = None,
     columns: options.Columns = None,
     sample_mesh: options.SampleMesh = None,
+    topic: options.Topic = None,
     label_all: Annotated[
         bool,
         options.own(
@@ -200,13 +201,13 @@ def detect(
             raise Failure(ExitCode.USAGE, "--all: says what -o writes; add -o OUT")
         files.check_stdout(output, as_json=as_json)
         talk, tiling = Talk("detect", as_json, quiet, debug), tiles.Tiling(as_one, tile_points, scheduler, overwrite)
+        reading = files.Reading(intrinsics, columns, sample_mesh, topic)
         if as_one:
-            refused = {"intrinsics": intrinsics, "columns": columns, "sample_mesh": sample_mesh, "where": where}
-            refused |= {"all": label_all, "report": report, "min_angle": min_angle, "crop": crop, "clobber": clobber}
+            refused = {"where": where, "all": label_all, "report": report, "min_angle": min_angle, "crop": crop}
+            refused |= {**vars(reading), "clobber": clobber}
             tiles.detect_as_one(sources, output, output_format, method, given, refused, tiling, talk, workers)
             return
         tiling.check_unused()
-        reading = files.Reading(intrinsics, columns, sample_mesh)
         wanted = _Wanted(reading, None if where is None else Where(where), method, given, min_angle, crop, label_all)
         extension = options.extension(output_format)
         todo = jobs.plan(sources, reading, output=output, extension=extension, report=report, clobber=clobber)
@@ -253,12 +254,8 @@ def _detect(wanted: _Wanted, job: Job, progress: Callable[[str], None]) -> Told:
     aside = {} if job.output is None else set_aside(cloud.attributes, columns)
     unit = unit_of(cloud, job.source)
     facts = {"input": job.source, "output": job.output, "report": None if page is None else str(page), "unit": unit}
-    facts |= {
-        "renamed": aside,
-        "lost": sentences(lost),
-        "notices": notices(cloud),
-        **collect(edges, found.not_selected, stages.seconds),
-    }
+    facts |= {"renamed": aside, "lost": sentences(lost), "notices": notices(cloud)}
+    facts |= collect(edges, found.not_selected, stages.seconds)
     return Told(
         facts,
         title=f"Edges of {job.name}",

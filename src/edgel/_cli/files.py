@@ -34,16 +34,23 @@ class Reading:
         Names of the columns of texts, commas between.
     sample_mesh : int or None
         Points to sample from meshes.
+    topic : str or None
+        Topic of ROS recordings, maybe with a colon and the number of a message.
     """
 
     intrinsics: str | None = None
     columns: str | None = None
     sample_mesh: int | None = None
+    topic: str | None = None
 
     @property
     def given(self) -> dict[str, Any]:
         """What was asked for, by the name of the argument of `edgel.read`."""
-        return {name: value for name, value in vars(self).items() if value is not None}
+        asked = {name: value for name, value in vars(self).items() if value is not None}
+        name, colon, number = (self.topic or "").rpartition(":")
+        if colon and number.isdecimal():
+            asked |= {"topic": name, "message": int(number)}
+        return asked
 
 
 def check_input(path: str, reading: Reading) -> None:

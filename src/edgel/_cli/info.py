@@ -46,12 +46,13 @@ def info(
     intrinsics: options.Intrinsics = None,
     columns: options.Columns = None,
     sample_mesh: options.SampleMesh = None,
+    topic: options.Topic = None,
     as_json: options.AsJson = False,
     debug: options.Debug = False,
 ) -> None:
     """Say what files hold."""
     with exit_codes(as_json=as_json, debug=debug):
-        reading = files.Reading(intrinsics, columns, sample_mesh)
+        reading = files.Reading(intrinsics, columns, sample_mesh, topic)
         work = partial(_describe, reading, None if where is None else Where(where))
         run_jobs(jobs.plan(sources, reading), work, Talk("info", as_json, debug=debug, show=_show))
 

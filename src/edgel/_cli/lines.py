@@ -65,6 +65,7 @@ def lines(
     intrinsics: options.Intrinsics = None,
     columns: options.Columns = None,
     sample_mesh: options.SampleMesh = None,
+    topic: options.Topic = None,
     tolerance: Annotated[
         float | None,
         options.own(
@@ -119,7 +120,7 @@ def lines(
             raise Failure(ExitCode.USAGE, f"--right-angles: expected degrees above 0 and up to 45, got {square:g}")
         condition = None if where is None else Where(where)
         drawing: dict[str, Any] = {"view": view, "unit": unit, "scale": scale}
-        reading = files.Reading(intrinsics, columns, sample_mesh)
+        reading = files.Reading(intrinsics, columns, sample_mesh, topic)
         wanted = _Wanted(reading, condition, check_options("auto", given), tolerance, square, drawing)
         if len(sources) == 1 and is_run(sources[0]):
             _check_tiled(options.given(kinds=kinds, min_strength=min_strength, where=where, viewpoint=viewpoint))

@@ -61,6 +61,7 @@ def normals(
     intrinsics: options.Intrinsics = None,
     columns: options.Columns = None,
     sample_mesh: options.SampleMesh = None,
+    topic: options.Topic = None,
     output_format: options.Format = None,
     clobber: options.Clobber = None,
     as_json: options.AsJson = False,
@@ -71,7 +72,7 @@ def normals(
     """Estimate the normal of every point of a cloud."""
     with exit_codes(as_json=as_json, debug=debug):
         files.check_stdout(output, as_json=as_json)
-        reading = files.Reading(intrinsics, columns, sample_mesh)
+        reading = files.Reading(intrinsics, columns, sample_mesh, topic)
         wanted = _Wanted(
             reading,
             None if where is None else Where(where),

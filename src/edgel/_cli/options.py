@@ -125,6 +125,16 @@ SampleMesh = Annotated[
         metavar="POINTS",
     ),
 ]
+Topic = Annotated[
+    str | None,
+    own(
+        "--topic",
+        text="Topic of ROS recordings, and after a colon which of its messages, as in /points:12.",
+        group=INPUT,
+        metavar="NAME",
+        default="the only one, its first message",
+    ),
+]
 Where = Annotated[
     str | None,
     own(

@@ -67,6 +67,7 @@ def render(
     intrinsics: options.Intrinsics = None,
     columns: options.Columns = None,
     sample_mesh: options.SampleMesh = None,
+    topic: options.Topic = None,
     direction: Annotated[
         str,
         _look(
@@ -104,8 +105,9 @@ def render(
         if min_strength is not None and "min_strength" in arguments(method):
             given["min_strength"] = min_strength
         condition = None if where is None else Where(where)
-        wanted = _Wanted(files.Reading(intrinsics, columns, sample_mesh), condition, method, given, min_strength, look)
-        todo = jobs.plan(sources, wanted.reading, output=output, known=[".png"], clobber=clobber)
+        reading = files.Reading(intrinsics, columns, sample_mesh, topic)
+        wanted = _Wanted(reading, condition, method, given, min_strength, look)
+        todo = jobs.plan(sources, reading, output=output, known=[".png"], clobber=clobber)
         run_jobs(todo, partial(_draw, wanted), Talk("render", as_json, quiet, debug), workers=workers)
 
 

@@ -36,6 +36,7 @@ def view(
     intrinsics: options.Intrinsics = None,
     columns: options.Columns = None,
     sample_mesh: options.SampleMesh = None,
+    topic: options.Topic = None,
     host: Annotated[
         str,
         options.own(
@@ -71,7 +72,7 @@ def view(
             raise Failure(ExitCode.USAGE, f"the viewer needs viser, which is not there ({error}); {remedy}") from error
         if port is not None and not 0 < port < 65536:
             raise Failure(ExitCode.USAGE, f"--port: expected 1 to 65535, got {port}")
-        reading = files.Reading(intrinsics, columns, sample_mesh)
+        reading = files.Reading(intrinsics, columns, sample_mesh, topic)
         clouds = expand(sources, reading)
         if host not in _LOCAL:
             print_line(

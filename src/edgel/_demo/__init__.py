@@ -132,7 +132,7 @@ def run_demo(
         for one, other in zip(measurements, others, strict=True)
     ]
     page = write_report(cases, folder, title="Edges of a tee and an elbow", findings=said, tables=tables)
-    figures = [folder / f"{one.name}-figure-{number}.png" for one in measurements for number in (1, 3, 4, 5, 8, 9)]
+    figures = [folder / f"{one.name}-figure-{number}.png" for one in measurements for number in range(1, 7)]
     return Demo(measurements, tables, said, page, (page, folder / "edges.png", *figures, *files))
 
 
@@ -144,7 +144,7 @@ def file_names() -> re.Pattern[str]:
 
 
 def side_by_side(measurements: Sequence[Measurement], *, width: int = 1600) -> np.ndarray:
-    """Draw figure 4 of all parts in one picture at one scale, (H, width, 3) uint8."""
+    """Draw all parts with their edges in one picture at one scale, (H, width, 3) uint8."""
     gap, rim = width // 40, 4
     extents = [np.ptp(one.solid.vertices[:, :2], axis=0) for one in measurements]
     free = width - gap * (len(extents) - 1) - 2 * rim * len(extents)

@@ -27,13 +27,13 @@ def section(
     ----------
     name : str
     figures : mapping of str to FigureImage
-        By the address of the file that holds it too.
+        By the address of the file that holds it too; the first comes before the tables.
     tables : sequence of Table
     histograms : sequence of Histogram
     files : sequence of (str, str)
         What a file holds, and its address.
     """
-    first, *others = (_figure(figure, address) for address, figure in _by_interest(figures))
+    first, *others = (_figure(figure, address) for address, figure in figures.items())
     own, drawn = "".join(map(_table, tables)), "".join(map(_histogram, histograms))
     links = "".join(f"<li>{html.escape(what)}: {_link(address)}</li>" for what, address in files)
     listed = f'<ul class="files">{links}</ul>' if links else ""
@@ -47,11 +47,6 @@ def opening(title: str, findings: Sequence[str], tables: Sequence[Table]) -> str
     listed = f'<ul class="findings">{items}</ul>' if items else ""
     own = "".join(map(_table, tables))
     return f'<h1>{html.escape(title)}</h1>{listed}<div class="tables">{own}</div>'
-
-
-def _by_interest(figures: Mapping[str, FigureImage]) -> list[tuple[str, FigureImage]]:
-    """Figure 4, the edges, comes first; the others follow by their numbers."""
-    return sorted(figures.items(), key=lambda item: (item[1].number != 4, item[1].number))
 
 
 def _figure(figure: FigureImage, address: str) -> str:

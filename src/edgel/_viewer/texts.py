@@ -118,9 +118,7 @@ def _pane_status(pane: Pane, settings: Settings) -> str:
         lines.append(f"<div style='{_ALARM}'>No edges: {escape(answer.error)}</div>")
     elif pane.edges is not None:
         shown, found = len(pane.edges), len(answer.edges)
-        lines.append(
-            f"<b>{shown:,} edge points</b> shown" + (f", {found - shown:,} fainter or hidden" if shown != found else "")
-        )
+        lines.append(f"<b>{shown:,} edge points</b> shown" + (f", of {found:,} candidates" if shown != found else ""))
         scale = "" if pane.run is None or pane.run.scale == 1 else f" at scale {pane.run.scale:g}"
         lines.append(f"<span style='{_NOTE}'>found in {answer.seconds:.2f} s{scale}, {_how(answer.edges)}</span>")
     if not pane.is_current and answer is not None:
@@ -129,13 +127,14 @@ def _pane_status(pane: Pane, settings: Settings) -> str:
 
 
 def _how(edges: Edges) -> str:
-    """Say in which way the detector looked, and why."""
+    """Say in which way the detector looked, what to pass as --method for it, and why."""
     ways = {
         "surface": "on the surface itself",
         "paper": "in the projected image",
         "organized": "along rows and columns",
     }
-    return escape(f"{ways.get(edges.method, f'in a {edges.method} view')}: {edges.reason}")
+    way = ways.get(edges.method, f"in a {edges.method} view")
+    return escape(f"{way} (--method {edges.method}): {edges.reason}")
 
 
 def _count(pane: Pane, kind: EdgeKind) -> int:

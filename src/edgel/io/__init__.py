@@ -14,7 +14,7 @@ import numpy as np
 
 from edgel._intrinsics import Intrinsics
 from edgel.cloud import Cloud
-from edgel.io import depth, e57, e57_write, floats, mesh, npy, obj, pcd, ply, ptx, text, text_write
+from edgel.io import depth, e57, e57_write, floats, mesh, npy, obj, pcd, ply, ptx, ros, text, text_write
 from edgel.io.depth import read_intrinsics
 from edgel.io.errors import FormatError, FormatWarning, printable
 from edgel.io.files import check_readable, describe
@@ -50,6 +50,7 @@ READERS: dict[str, Callable[[Any], Cloud]] = {
     ".bin": floats.read,
     ".obj": obj.read,
     **dict.fromkeys(_DEPTH, depth.read),
+    **dict.fromkeys(ros.EXTENSIONS, ros.read),
 }
 """Functions ``(path) -> Cloud`` by extension, lower case."""
 
@@ -69,6 +70,8 @@ MEANT_FOR: dict[str, tuple[str, ...]] = {
     "intrinsics": (*_DEPTH, ".npy"),
     "columns": (*_TEXT, ".bin"),
     "sample_mesh": mesh.EXTENSIONS,
+    "topic": ros.EXTENSIONS,
+    "message": ros.EXTENSIONS,
 }
 """Extensions of the files that each option of `read` is for."""
 
@@ -78,7 +81,6 @@ _NOT_CLOUDS = {
         (".3mf", ".gltf", ".glb", ".dae"), "a mesh, not a point cloud; save it as .ply, .obj or .stl first"
     ),
     **dict.fromkeys((".step", ".stp", ".iges", ".igs", ".brep"), "a CAD model, not a point cloud; sample it first"),
-    **dict.fromkeys((".mcap", ".bag", ".db3"), "a ROS recording, not supported; convert its clouds to .pcd first"),
     **dict.fromkeys((".jpg", ".jpeg", ".bmp", ".exr"), "an image; depth is read from .png, .tif or .npy"),
     **dict.fromkeys((".gz", ".zip", ".7z", ".xz", ".bz2"), "compressed; unpack it first"),
 }
@@ -90,20 +92,27 @@ def read(
     intrinsics: Any = None,
     columns: str | Sequence[str] | None = None,
     sample_mesh: int | None = None,
+    topic: str | None = None,
+    message: int | None = None,
 ) -> Cloud:
     """Read a point cloud; the extension tells the format, the content is checked.
 
     Parameters
     ----------
     path : path or binary file
-        PLY, PCD, LAS, LAZ (COPC too), XYZ, TXT, CSV, ASC, PTS, PTX, NPY, NPZ, E57, BIN (KITTI, nuScenes), OBJ, or a
-        depth image (PNG, TIFF, NPY). An open binary file (``sys.stdin.buffer``) is read as PLY.
+        PLY, PCD, LAS, LAZ (COPC too), XYZ, TXT, CSV, ASC, PTS, PTX, NPY, NPZ, E57, BIN (KITTI, nuScenes), OBJ, a
+        depth image (PNG, TIFF, NPY), or a ROS recording (MCAP, BAG, DB3). An open binary file
+        (``sys.stdin.buffer``) is read as PLY.
     intrinsics : Intrinsics, path, or another camera, optional
         The camera of a depth image (see `edgel.from_depth`), or the file that holds it (see `read_intrinsics`).
     columns : str or sequence of str, optional
         Names of the columns of a text or a BIN, such as ``"x,y,z,intensity"``; ``_`` leaves a column out.
     sample_mesh : int, optional
         How many points to sample from the surface of a mesh (PLY, OBJ, STL, OFF), evenly by area.
+    topic : str, optional
+        The topic of a ROS recording; default: the only one that carries clouds. `edgel.io.ros.topics` lists them.
+    message : int, optional
+        Which of its messages, from 0; default: the first. `edgel.io.ros.frames` goes through all.
 
     Returns
     -------
@@ -118,7 +127,7 @@ def read(
     FormatError
         If the extension is unknown, the content is something else, or the file is cut off or damaged.
     ValueError
-        If `intrinsics`, `columns` or `sample_mesh` are given for a file that has no use for them.
+        If an option is given for a file that has no use for it.
 
     Examples
     --------
@@ -129,39 +138,40 @@ def read(
     Cloud(3 points, unorganized; attributes: label)
     """
     # A NaN of a damaged or foreign file is a point that is missing, not a fault of arithmetic to warn of.
+    options = {"intrinsics": intrinsics, "columns": columns, "sample_mesh": sample_mesh}
+    options |= {"topic": topic, "message": message}
     with np.errstate(all="ignore"):
-        return _read(path, intrinsics, columns, sample_mesh)
+        return _read(path, {name: value for name, value in options.items() if value is not None})
 
 
-def _read(
-    path: str | os.PathLike[str] | BinaryIO,
-    intrinsics: Any,
-    columns: str | Sequence[str] | None,
-    num_points: int | None,
-) -> Cloud:
+def _read(path: str | os.PathLike[str] | BinaryIO, options: dict[str, Any]) -> Cloud:
+    """Read with the options that were given."""
     if not isinstance(path, (str, os.PathLike)):
         _check_stream(path, "read")
-        _check_use("an open file", "", intrinsics=intrinsics, columns=columns, sample_mesh=num_points)
+        _check_use("an open file", "", options)
         return ply.read(path)
     extension, name = Path(path).suffix.lower(), printable(path)
     check_readable(path)
-    if extension not in READERS and not (num_points is not None and extension in mesh.EXTENSIONS):
+    if extension not in READERS and not ("sample_mesh" in options and extension in mesh.EXTENSIONS):
         _unknown(path, extension, READERS)
-    _check_use(name, extension, intrinsics=intrinsics, columns=columns, sample_mesh=num_points)
-    if num_points is not None:
-        return mesh.sample(path, num_points)
-    if intrinsics is not None:
-        return depth.read(path, intrinsics=intrinsics)
-    if columns is not None:
-        return floats.read(path, columns=columns) if extension == ".bin" else text.read(path, columns=columns)
+    _check_use(name, extension, options)
+    if "sample_mesh" in options:
+        return mesh.sample(path, options["sample_mesh"])
+    if "intrinsics" in options:
+        return depth.read(path, intrinsics=options["intrinsics"])
+    if "columns" in options:
+        return (floats if extension == ".bin" else text).read(path, columns=options["columns"])
+    if options:
+        return ros.read(path, **options)
     return READERS[extension](path)
 
 
-def _check_use(name: str, extension: str, **options: Any) -> None:
+def _check_use(name: str, extension: str, options: dict[str, Any]) -> None:
     """Raise ValueError for options that a file has no use for."""
     words = {"intrinsics": "depth image", "columns": "text or sweep", "sample_mesh": "mesh"}
-    for option, value in options.items():
-        if value is not None and extension not in MEANT_FOR[option]:
+    words |= dict.fromkeys(("topic", "message"), "ROS recording")
+    for option in options:
+        if extension not in MEANT_FOR[option]:
             what = f"{words[option]} ({', '.join(MEANT_FOR[option])})"
             raise ValueError(f"{option}: {name} is no {what}; name another file, or leave the option out")
 

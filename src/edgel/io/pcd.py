@@ -64,7 +64,7 @@ def read(path: str | os.PathLike[str]) -> Cloud:
     spelled = {field: name for field, name in standard_names([*fields]).items() if name in NORMALS}
     for field, values in fields.items():
         if field.lower() in ("rgb", "rgba") and values.ndim == 1 and values.dtype.itemsize == 4:
-            attributes.update(_unpack_colors(values, with_alpha=field.lower() == "rgba"))
+            attributes.update(unpack_colors(values, with_alpha=field.lower() == "rgba"))
         else:
             attributes[spelled.get(field, field)] = values
     shape = (header.height, header.width) if min(header.height, header.width) > 1 else None
@@ -153,7 +153,7 @@ def _read_compressed(path: str, file: BinaryIO, header: Header) -> tuple[np.ndar
     return xyz, {name: values.astype(values.dtype.newbyteorder("="), copy=True) for name, values in kept.items()}
 
 
-def _unpack_colors(packed: np.ndarray, *, with_alpha: bool) -> dict[str, np.ndarray]:
+def unpack_colors(packed: np.ndarray, *, with_alpha: bool) -> dict[str, np.ndarray]:
     bits = np.ascontiguousarray(packed).view(np.uint32)
     shifts = {"red": 16, "green": 8, "blue": 0, "alpha": 24}
     channels = {name: (bits >> shift & 255).astype(np.uint8) for name, shift in shifts.items()}

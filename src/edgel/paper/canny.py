@@ -27,12 +27,15 @@ class CannyResult:
         The image after the Gaussian, in the image's unit.
     magnitude : (H, W) float64
         Length of the Sobel gradient: 4 times the height of a step along an axis.
+    thinned : (H, W) float64
+        The magnitude where it is a maximum along the gradient, 0 elsewhere.
     edges : (H, W) bool
         The edge map.
     """
 
     smooth: np.ndarray
     magnitude: np.ndarray
+    thinned: np.ndarray
     edges: np.ndarray
 
 
@@ -61,7 +64,8 @@ def canny(image: np.ndarray, *, kernel_size: int, sigma: float, low: float, high
     smoothed = smooth(image, kernel_size, sigma)
     gx, gy = gradient(smoothed)
     magnitude = np.hypot(gx, gy)
-    return CannyResult(smoothed, magnitude, hysteresis(non_maximum_suppression(magnitude, gx, gy), low, high))
+    thinned = non_maximum_suppression(magnitude, gx, gy)
+    return CannyResult(smoothed, magnitude, thinned, hysteresis(thinned, low, high))
 
 
 def check_gaussian(kernel_size: int, sigma: float) -> None:

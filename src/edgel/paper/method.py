@@ -8,7 +8,7 @@ the numbers recomputed in docs/errata.md.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, Self
 
 import numpy as np
@@ -38,9 +38,11 @@ _FIRST_REACH = 2.99
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PaperEdges(Edges):
-    """Edges of the published method, with the images they come from.
+    """Edges of the published method, with the image of every step.
 
-    It knows of one face only: the second normal, `direction` and `angle` are NaN, `position` is the point itself.
+    It knows of one face only: the second normal, `direction` and `angle` are NaN, `position` is the point itself. All
+    images have a frame of one empty pixel: the part touches the border, and its outline may be steepest just outside.
+    Row 0 lies at the smallest y.
 
     Attributes
     ----------
@@ -48,16 +50,27 @@ class PaperEdges(Edges):
         Best-fit plane of each edge point's neighbours in the whole cloud, with D and e of eq. 20.
     grid : PixelGrid
         Where the pixels lie in the cloud.
+    projection : (H + 2, W + 2) float64
+        The highest z in each pixel, in the cloud's unit, NaN where no point falls (eq. 1-2).
     image : (H + 2, W + 2) float64
-        The projection in grey, 0 where no point falls (fig. 1c, 3a); row 0 at the smallest y. It has a frame of one
-        empty pixel: the part touches the border, and its outline may be steepest just outside.
+        The projection in grey, 0 where no point falls (eq. 5-6, fig. 1c, 3a).
+    smoothed : (H + 2, W + 2) float64
+        The image after the Gaussian (eq. 12).
+    gradient : (H + 2, W + 2) float64
+        Magnitude of the smoothed image's Sobel gradient (eq. 13).
+    thinned : (H + 2, W + 2) float64
+        The gradient where non-maximum suppression leaves it, 0 elsewhere (section 3.3).
     edge_map : (H + 2, W + 2) bool
-        Canny's edge pixels (fig. 3b).
+        The edge pixels (fig. 3b): Canny's, or those that were given.
     """
 
     planes: Normals
     grid: PixelGrid
+    projection: np.ndarray
     image: np.ndarray
+    smoothed: np.ndarray
+    gradient: np.ndarray
+    thinned: np.ndarray
     edge_map: np.ndarray
 
     def take(self, rows: np.ndarray) -> Self:
@@ -78,6 +91,7 @@ def detect(
     gray_min: float = 100.0,
     num_neighbors: int = 16,
     scale: float = 1.0,
+    edge_map: Any = None,
     progress: Callable[[str], None] | None = None,
 ) -> PaperEdges:
     """Find edge points and their normals as the paper does.
@@ -104,6 +118,9 @@ def detect(
         k of the plane fits (step 9).
     scale : float
         Side of the voxels to one point of which the cloud is thinned first, in median spacings; at 1 it is not thinned.
+    edge_map : (H + 2, W + 2) bool array_like, optional
+        Edge pixels of your own in place of Canny's, such as another detector finds in `PaperEdges.image` of the same
+        cloud; back-projection and normals are as ever, and `low` and `high` have no say.
     progress : callable, optional
         Called with the name of each stage as it begins.
 
@@ -133,22 +150,19 @@ def detect(
     check_num_neighbors(num_neighbors, len(checked.xyz))
     check_scale(scale)
     if scale > 1:
-        options = {
-            "width": width,
-            "height": height,
-            "kernel_size": kernel_size,
-            "sigma": sigma,
-            "low": low,
-            "high": high,
-        }
-        options |= {"tolerance": tolerance, "gray_min": gray_min, "num_neighbors": num_neighbors}
+        options = {"width": width, "height": height, "kernel_size": kernel_size, "sigma": sigma}
+        options |= {"low": low, "high": high, "tolerance": tolerance, "gray_min": gray_min}
+        options |= {"num_neighbors": num_neighbors, "edge_map": edge_map}
         return at_scale(detect, points, scale, progress=progress, **options)
     stages = Stages(progress)
     with stages("projection"):
         grid = choose_grid(checked.xyz, width, height)
-        image = np.pad(grey_image(project(checked.xyz, grid), grid, gray_min), grid.frame)
+        highest = project(checked.xyz, grid)
+        image = np.pad(grey_image(highest, grid, gray_min), grid.frame)
+        given = None if edge_map is None else _check_edge_map(edge_map, image.shape)
     with stages("canny"):
         found = canny_of_projection(image, kernel_size, sigma, low, high)
+        found = found if given is None else replace(found, edges=given)
     with stages("back-projection"):
         window = choose_tolerance(tolerance, grid)
         hits = back_project(checked.xyz, grid, found.edges, found.magnitude, window)
@@ -164,21 +178,24 @@ def detect(
         num_points=checked.num_input,
         num_dropped=checked.num_dropped,
         method="paper",
-        reason="the published method looks along Z",
+        reason="the published method looks along Z" + ("" if given is None else "; the edge map was given"),
         parameters={
             "width": grid.width,
             "height": grid.height,
             "kernel_size": kernel_size,
             "sigma": sigma,
-            "low": low,
-            "high": high,
+            **({"low": low, "high": high} if given is None else {}),
             "tolerance": window,
             "gray_min": gray_min,
             "num_neighbors": num_neighbors,
         },
         seconds=stages.seconds,
         grid=grid,
+        projection=np.pad(highest, grid.frame, constant_values=np.nan),
         image=image,
+        smoothed=found.smooth,
+        gradient=found.magnitude,
+        thinned=found.thinned,
         edge_map=found.edges,
     )
 
@@ -260,4 +277,15 @@ def canny_of_projection(image: np.ndarray, kernel_size: int, sigma: float, low: 
     frame = kernel_size // 2 + 2
     found = canny(np.pad(image, frame), kernel_size=kernel_size, sigma=sigma, low=low, high=high)
     inner = (slice(frame, -frame), slice(frame, -frame))
-    return CannyResult(found.smooth[inner], found.magnitude[inner], found.edges[inner])
+    return CannyResult(*(getattr(found, step.name)[inner] for step in fields(found)))
+
+
+def _check_edge_map(edge_map: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """Return a user's edge map as bool of the image's shape; ValueError if it is none."""
+    given = np.asarray(edge_map)
+    if given.shape != shape or given.dtype.kind not in "biu":
+        raise ValueError(
+            f"edge_map: expected bool of shape {shape}, that of the projection with its frame of one pixel "
+            f"(PaperEdges.image), got {given.dtype} of shape {given.shape}; give width and height if it is another's"
+        )
+    return np.ascontiguousarray(given, np.bool_)

@@ -35,7 +35,7 @@ class FigureImage:
     Attributes
     ----------
     number : int
-        1, 3, 4 and 5 follow the paper's figures of these numbers; what the paper has not begins with 6.
+        From 1, in the order in which the page shows them.
     caption : str
     png : bytes
         On white, with the caption below the panels.
@@ -94,25 +94,25 @@ class Panel:
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """What a figure holds: panels, a legend where they have none themselves, and the caption."""
+    """What a figure holds: panels, a legend where they have none themselves, and the caption without its number."""
 
-    number: int
     caption: str
     panels: Sequence[Panel]
     legend: Sequence[tuple[Color, str]] = field(default_factory=list)
 
 
-def figure_image(content: Content) -> FigureImage:
-    """Draw a figure on white and on black."""
+def figure_image(content: Content, number: int, name: str) -> FigureImage:
+    """Draw a figure of a cloud of some name on white and on black."""
+    caption = f"Figure {number}. {name}: {content.caption}"
     light, dark = (
         _compose(content, [panel.image(background) for panel in content.panels], THEMES[background])
         for background in ("light", "dark")
     )
-    captioned = _with_caption(light, content.caption, THEMES["light"])
+    captioned = _with_caption(light, caption, THEMES["light"])
     forms = ((captioned, {"format": "PNG"}), (light, _SMALL), (dark, _SMALL))
     with ThreadPoolExecutor(len(forms)) as pool:  # packing takes as long as drawing
         files = pool.map(lambda image, form: _encoded(image, **form), *zip(*forms, strict=True))
-        return FigureImage(content.number, content.caption, *files)
+        return FigureImage(number, caption, *files)
 
 
 def _encoded(image: Image.Image, **form: Any) -> bytes:

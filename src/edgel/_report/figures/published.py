@@ -1,4 +1,4 @@
-"""The paper's figures 1, 3, 4 and 5 for any cloud and its edges."""
+"""What the paper's figures 1, 3, 4 and 5 show, for any cloud and its edges."""
 
 from __future__ import annotations
 
@@ -18,10 +18,12 @@ _POINT = 2.0  # their width, in pixels
 _SIZE = (1500, 940)
 
 
-def figure_1(cloud: Cloud, edges: Edges, name: str, part: Cloud | None) -> Content:
-    """Make the part, the cloud, and its projection, as far as there are such."""
-    panels, words = [], []
+def cloud_and_projection(cloud: Cloud, edges: Edges, part: Cloud | None) -> Content | None:
+    """Make the part, the cloud, and its projection, as far as there are such; None where the cloud would be alone."""
     published = isinstance(edges, PaperEdges)
+    if part is None and not published:
+        return None
+    panels, words = [], []
     viewport = Viewport((900, 800), "oblique", crop=True) if published else Viewport(_SIZE, crop=True)
     if part is None:
         panels.append(Panel(Drawing(cloud, None, viewport, legend=False).on, "the cloud"))
@@ -38,15 +40,13 @@ def figure_1(cloud: Cloud, edges: Edges, name: str, part: Cloud | None) -> Conte
         projection = _projection(edges)
         panels.append(Panel(lambda _: projection, "its projection", raster=True))
         words.append("its projection on the x, y plane, the lighter the higher, black where no point falls")
-    if len(panels) == 1:
-        return Content(1, f"Figure 1. {name}: {words[0]}.", [replace(panels[0], title="")])
     letters = [f"({letter}) " for letter in "abc"]
     titled = [replace(panel, title=letter + panel.title) for letter, panel in zip(letters, panels, strict=False)]
     caption = "; ".join(letter + word for letter, word in zip(letters, words, strict=False))
-    return Content(1, f"Figure 1. {name}: {caption}.", titled)
+    return Content(f"{caption}.", titled)
 
 
-def figure_3(edges: PaperEdges, name: str) -> Content:
+def projection_and_edge_map(edges: PaperEdges) -> Content:
     """Make the projection and the edge map."""
     grid = edges.grid
     extent = grid.extent
@@ -55,33 +55,32 @@ def figure_3(edges: PaperEdges, name: str) -> Content:
         Panel(lambda _: _projection(edges), f"(a) projection, {grid.width} x {grid.height} pixels", True, extent),
         Panel(lambda _: edge_map, f"(b) edge map, {np.count_nonzero(edges.edge_map):,} edge pixels", True, extent),
     ]
-    caption = f"Figure 3. {name}: (a) the projection; (b) the edge pixels that Canny's method finds in it, in black."
-    return Content(3, caption, panels)
+    return Content("(a) the projection; (b) the edge pixels that Canny's method finds in it, in black.", panels)
 
 
-def figure_4(cloud: Cloud, edges: Edges, name: str) -> Content:
+def edges_on_cloud(cloud: Cloud, edges: Edges) -> Content:
     """Make the cloud with its edge points."""
     published = isinstance(edges, PaperEdges)
     direction = "top" if published else "auto"
     drawing = Drawing(cloud, edges, Viewport(_SIZE, direction, crop=True))
     view = ", seen from above" if published else ""
     number = f"{len(edges):,} edge points ({edges.share:.1%})"
-    caption = f"Figure 4. {name}: the cloud of {edges.num_points:,} points in grey, its {number} by their kind{view}."
+    caption = f"the cloud of {edges.num_points:,} points in grey, its {number} by their kind{view}."
     if (edges.kind & (edges.kind - 1)).any():
         caption += " Points of several kinds wear the color of the first."
-    return Content(4, caption, [Panel(drawing.on)])
+    return Content(caption, [Panel(drawing.on)])
 
 
-def figure_5(cloud: Cloud, edges: Edges, name: str) -> Content:
+def normals_at_edges(cloud: Cloud, edges: Edges) -> Content:
     """Make the normals at the edge points."""
     direction = "oblique" if isinstance(edges, PaperEdges) else "auto"
     drawing = Drawing(cloud, edges, Viewport(_SIZE, direction, crop=True), normals=True)
-    caption = f"Figure 5. {name}: surface normals at the edge points, as arrows at an even selection of them."
+    caption = "surface normals at the edge points, as arrows at an even selection of them."
     if isinstance(edges, PaperEdges):
         caption += " As in the paper they are turned so that D > 0 (eq. 20), which is not always outwards."
     if edges.num_without_normal:
         caption += f" {edges.num_without_normal:,} edge points have no normal: their neighbours span no plane."
-    return Content(5, caption, [Panel(drawing.on)])
+    return Content(caption, [Panel(drawing.on)])
 
 
 def _thinned(cloud: Cloud) -> Cloud:

@@ -22,7 +22,7 @@ _OVERVIEW, _DETAIL = (456, 342), (342, 342)  # as large as they are shown beside
 _HALF = (740, 600)
 
 
-def figure_6(cloud: Cloud, edges: Edges, name: str) -> Content:
+def each_kind(cloud: Cloud, edges: Edges) -> Content:
     """Make one panel for each kind that occurs."""
     kinds = [kind for kind in KIND_COLORS if ((edges.kind & int(kind)) > 0).any()]
     size = (1500 // len(kinds), round(1500 / len(kinds) * 0.8))
@@ -32,11 +32,10 @@ def figure_6(cloud: Cloud, edges: Edges, name: str) -> Content:
         found = replace(found, kind=np.full(len(found), int(kind), np.uint8))  # each in the color of this kind
         drawing = Drawing(cloud, found, Viewport(size, crop=True), legend=False)
         panels.append(Panel(drawing.on, f"{kind_names(kind)[0]}: {len(found):,}"))
-    caption = f"Figure 6. {name}: the edge points of each kind alone. A point of several kinds is in several panels."
-    return Content(6, caption, panels)
+    return Content("the edge points of each kind alone. A point of several kinds is in several panels.", panels)
 
 
-def figure_8(cloud: Cloud, edges: Edges, name: str) -> Content:
+def strongest_places(cloud: Cloud, edges: Edges) -> Content:
     """Make an overview and the places where the edges are most marked."""
     overview = Drawing(cloud, edges, Viewport(_OVERVIEW), legend=False)
     boxes, panels = [], []
@@ -48,10 +47,8 @@ def figure_8(cloud: Cloud, edges: Edges, name: str) -> Content:
         drawing = Drawing(cloud, edges, Viewport(_DETAIL, detail=(at, width)), legend=False)
         panels.append(Panel(drawing.on, f"({letter}) {width:.3g} wide"))
     whole = Panel(overview.on, "(a) the whole", boxes=boxes)
-    caption = (
-        f"Figure 8. {name}: where edges are most marked, by the sum of their strength; widths in the cloud's unit."
-    )
-    return Content(8, caption, [whole, *panels], kind_legend(edges))
+    caption = "where edges are most marked, by the sum of their strength; widths in the cloud's unit."
+    return Content(caption, [whole, *panels], kind_legend(edges))
 
 
 @dataclass(frozen=True)
@@ -83,14 +80,14 @@ def strongest(buffer: ZBuffer, edges: Edges) -> list[StrongPlace]:
     return chosen
 
 
-def figure_9(cloud: Cloud, edges: Edges, other: Edges, name: str) -> Content:
+def both_methods(cloud: Cloud, edges: Edges, other: Edges) -> Content:
     """Make the answers of the two methods beside each other."""
     panels = []
     for letter, one in zip("ab", published_last(edges, other), strict=True):
         title = f"({letter}) {one.method}: {len(one):,} edge points ({one.share:.1%})"
         panels.append(Panel(Drawing(cloud, one, Viewport(_HALF), legend=False).on, title))
     legend = list(dict.fromkeys(kind_legend(edges) + kind_legend(other)))
-    return Content(9, f"Figure 9. {name}: what the two methods find, in one view.", panels, legend)
+    return Content("what the two methods find, in one view.", panels, legend)
 
 
 def kind_legend(edges: Edges) -> list[tuple[Color, str]]:
