@@ -1,0 +1,1 @@
+"""Rigid registration from edges."""
