@@ -13,13 +13,16 @@ from typing import Any
 import numpy as np
 import parts
 import scenes
+from scipy.spatial import KDTree
 
 from edgel import Cloud, synth
 from edgel.synth import Solid, make_solid
 
 PLANAR = ("stepped_block", "cube_fractal", "wedge_fan", "frustum", "bracket", "plate", "chamfered_block")
 ROUND = ("flange", "tee", "elbow", "gear")
-ROWS = ("view to view", "part to view", "clutter", "crops", "round")
+ROWS = ("view to view", "part to view", "clutter", "crops", "planar", "round")
+MIN_OVERLAP = {"view to view": 0.3, "part to view": 0.15, "clutter": 0.25, "crops": 0.3, "planar": 0.3, "round": 0.3}
+"""Least share of the source's points that the target shows too: less is no question of matching."""
 MOST_POINTS = 12_000
 """Of a cloud: spacings follow from it, as a scanner's do from its distance."""
 
@@ -122,6 +125,12 @@ def solid_of(name: str) -> Solid:
     return scenes.solid(name)
 
 
+def overlap(source: Cloud, target: Cloud, pose: np.ndarray, h: float) -> float:
+    """Share of the source's points that lie by the target's within 2 spacings, at the true pose."""
+    a, b = (cloud.xyz[np.isfinite(cloud.xyz).all(axis=1)] for cloud in (source, target))
+    return float((KDTree(b).query(a[::5] @ pose[:3, :3].T + pose[:3, 3])[0] < 2 * h).mean())
+
+
 def direction(rng: np.random.Generator) -> np.ndarray:
     vector = rng.standard_normal(3)
     return vector / np.linalg.norm(vector)
@@ -147,13 +156,20 @@ def make(row: str, noise: float, number: int, *, held: int = 0) -> Pair:
     group, axis = symmetry(name, solid)
     h = spacing_of(solid)
     maker = {"part to view": _part_to_view, "clutter": _clutter, "crops": _crops}.get(row, _view_to_view)
-    source, target, pose, frame = maker(solid, h, noise, rng)
+    while True:
+        source, target, pose, frame = maker(solid, h, noise, rng)
+        if overlap(source, target, pose, h) >= MIN_OVERLAP[row]:
+            break
     inverse = np.linalg.inv(frame)
     middle = (frame @ np.append((solid.vertices.min(axis=0) + solid.vertices.max(axis=0)) / 2, 1))[:3]
-    return Pair(f"{row}/{name}/n{noise:g}/{number}", name, source, target, pose, frame @ group @ inverse, axis, middle, h)
+    return Pair(
+        f"{row}/{name}/n{noise:g}/{number}", name, source, target, pose, frame @ group @ inverse, axis, middle, h
+    )
 
 
-def _view(solid: Solid, h: float, noise: float, along: np.ndarray, rng: np.random.Generator, outliers: float = 0.0) -> Any:
+def _view(
+    solid: Solid, h: float, noise: float, along: np.ndarray, rng: np.random.Generator, outliers: float = 0.0
+) -> Any:
     seed = int(rng.integers(2**31))
     roll = float(rng.uniform(-np.pi, np.pi))
     return synth.view(
@@ -161,7 +177,9 @@ def _view(solid: Solid, h: float, noise: float, along: np.ndarray, rng: np.rando
     )
 
 
-def _view_to_view(solid: Solid, h: float, noise: float, rng: np.random.Generator) -> tuple[Cloud, Cloud, np.ndarray, np.ndarray]:
+def _view_to_view(
+    solid: Solid, h: float, noise: float, rng: np.random.Generator
+) -> tuple[Cloud, Cloud, np.ndarray, np.ndarray]:
     """Two views 25 to 70 degrees apart."""
     first = direction(rng)
     across = np.cross(first, direction(rng))
@@ -170,7 +188,9 @@ def _view_to_view(solid: Solid, h: float, noise: float, rng: np.random.Generator
     return a.cloud, b.cloud, b.pose @ np.linalg.inv(a.pose), a.pose
 
 
-def _part_to_view(solid: Solid, h: float, noise: float, rng: np.random.Generator) -> tuple[Cloud, Cloud, np.ndarray, np.ndarray]:
+def _part_to_view(
+    solid: Solid, h: float, noise: float, rng: np.random.Generator
+) -> tuple[Cloud, Cloud, np.ndarray, np.ndarray]:
     """The whole part, sampled without noise and with its normals as from its mesh, to a view."""
     part = synth.sample(solid, pattern="blue_noise", spacing=h, seed=int(rng.integers(2**31)))
     b = _view(solid, h, noise, direction(rng), rng)
@@ -179,7 +199,9 @@ def _part_to_view(solid: Solid, h: float, noise: float, rng: np.random.Generator
     return cloud, b.cloud, b.pose @ np.linalg.inv(frame), frame
 
 
-def _crops(solid: Solid, h: float, noise: float, rng: np.random.Generator) -> tuple[Cloud, Cloud, np.ndarray, np.ndarray]:
+def _crops(
+    solid: Solid, h: float, noise: float, rng: np.random.Generator
+) -> tuple[Cloud, Cloud, np.ndarray, np.ndarray]:
     """Two samples of the whole part, of each of which a plane cuts off a third; no sensor is known."""
     clouds, frames = [], []
     for _ in range(2):
@@ -191,7 +213,9 @@ def _crops(solid: Solid, h: float, noise: float, rng: np.random.Generator) -> tu
     return clouds[0], clouds[1], frames[1] @ np.linalg.inv(frames[0]), frames[0]
 
 
-def _clutter(solid: Solid, h: float, noise: float, rng: np.random.Generator) -> tuple[Cloud, Cloud, np.ndarray, np.ndarray]:
+def _clutter(
+    solid: Solid, h: float, noise: float, rng: np.random.Generator
+) -> tuple[Cloud, Cloud, np.ndarray, np.ndarray]:
     """A view of the part, to one of it on a table among three others, with 1 % outliers."""
     others = [solid_of(n) for n in rng.choice(PLANAR + ROUND, 3, replace=False)]
     pitch = 0.9 * solid.size
@@ -208,7 +232,7 @@ def _clutter(solid: Solid, h: float, noise: float, rng: np.random.Generator) -> 
         faces.append(one.face + 10_000 * k)
         pose[:3, 3] = shift
         placed.append(pose)
-    side = 2.2 * pitch
+    side = 1.9 * pitch
     table = side * (np.array([[[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0], [1, 1, 0], [0, 1, 0]]]) - [0.5, 0.5, 0])
     corners.append(table)
     normals.append(np.broadcast_to([0.0, 0.0, 1.0], table.shape))

@@ -54,10 +54,10 @@ class HalfEdges:
 
     def thinned(self, apart: float, most: int) -> HalfEdges:
         """Return at most so many, at least about so far apart where they look alike; the same for any order."""
-        rows = np.arange(len(self))
+        rows, steps = np.arange(len(self)), _FRAME_STEPS
         while True:
             cell = np.floor(self.places[rows] / apart)
-            looks = np.round(_FRAME_STEPS * self.frames[rows, :2].reshape(-1, 6))
+            looks = np.round(steps * self.frames[rows, :2].reshape(-1, 6))
             away = ((self.places[rows] / apart - cell - 0.5) ** 2).sum(axis=1)
             keys = np.concatenate([cell, looks], axis=1).T
             order = np.lexsort((*self.places[rows].T, away, *keys))
@@ -66,7 +66,7 @@ class HalfEdges:
             rows = np.sort(rows[order[first]])
             if len(rows) <= most:
                 return self.take(rows)
-            apart *= max((len(rows) / most) ** 0.5, 1.1)
+            apart, steps = apart * max((len(rows) / most) ** 0.5, 1.1), 0.9 * steps
 
 
 def join(parts: list[HalfEdges]) -> HalfEdges:
@@ -103,7 +103,9 @@ def of_creases(
     return both.take(np.isfinite(both.frames).all(axis=(1, 2)))
 
 
-def of_edges(edges: Edges, surface: np.ndarray, normals: np.ndarray, spacing: float, eye: np.ndarray | None) -> HalfEdges:
+def of_edges(
+    edges: Edges, surface: np.ndarray, normals: np.ndarray, spacing: float, eye: np.ndarray | None
+) -> HalfEdges:
     """Make the half-edges of what a detector found.
 
     Outlines count where the surface does not turn away from the sensor, and not the far sides of depth steps.
@@ -127,7 +129,17 @@ def of_edges(edges: Edges, surface: np.ndarray, normals: np.ndarray, spacing: fl
     if len(rim) and len(surface):
         normal, into = rim.normals[:, 0], np.cross(rim.normals[:, 0], rim.direction)
         beside = np.zeros(len(rim))
-        run_slices(_lean, len(rim), rim.position, normal, into, surface, normals, build_grid(surface, _BESIDE * spacing), beside)
+        run_slices(
+            _lean,
+            len(rim),
+            rim.position,
+            normal,
+            into,
+            surface,
+            normals,
+            build_grid(surface, _BESIDE * spacing),
+            beside,
+        )
         facing = np.ones(len(rim)) if eye is None else _facing(rim.position, normal, eye)
         kept = (np.abs(beside) > 0.2 * spacing) & (facing > MIN_FACING)
         frames = frames_of(into[kept] * np.sign(beside[kept])[:, None], normal[kept])

@@ -9,70 +9,128 @@ import numpy as np
 from edgel.matching._half_edges import HalfEdges, rareness
 from edgel.matching._hypotheses import propose
 from edgel.matching._prepare import Prepared
-from edgel.matching._refine import refine
-from edgel.matching._verify import Field, Probes, confirm, field_of, probes_of, scores_of
+from edgel.matching._refine import middle_of, refine
+from edgel.matching._verify import MISSING, THROUGH, Field, Probes, confirm, field_of, probes_of, scores_of
 
 PARTS = 28  # of the smaller cloud's size: how far apart half-edges are that propose
 _APART = 8.0  # spacings, at most
 _SOURCES, _TARGETS, _VOTERS, _SURFACE = 300, 2400, 64, 250
+_MOST = 3000  # half-edges that refine
 _PROPOSED, _REFINED, _FINAL = 1500, 80, 12
+_REACH, _TIGHT, _END = 4.0, 2.0, 1.5  # spacings: matches at first, of a verification, and in the end
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Distinct poses, best first.
+    """Distinct poses of a source in a target, best first.
 
     Attributes
     ----------
     poses : (P, 4, 4) float64
+        T_target_source.
     scores : (P,) float64
-    columns : (P, 5) float64
-        See `edgel.matching._verify.confirm`; of both clouds, each looked for in the other.
+    columns : (P, 2, 5) float64
+        See `edgel.matching._verify.confirm`: the source looked for in the target, and the other way round.
     """
 
     poses: np.ndarray
     scores: np.ndarray
     columns: np.ndarray
-    information: np.ndarray
-    residuals: np.ndarray
+
+    def take(self, rows: np.ndarray) -> Found:
+        """Return some of the poses."""
+        return Found(self.poses[rows], self.scores[rows], self.columns[rows])
 
 
-def search(source: Prepared, target: Prepared) -> Found:
-    """Find the poses of a source in a target that edges and surface confirm."""
-    spacing = max(source.spacing, target.spacing)
-    apart = min(min(source.size, target.size) / PARTS, _APART * spacing)
-    few, some = source.half.thinned(apart, _SOURCES), target.half.thinned(apart, _TARGETS)
-    probes = _probes(few, source, _SURFACE)
-    coarse = field_of(some, target.surface, target.normals, target.smooth, target.sight, 1.5 * apart)
-    voters = _voters(probes)
-    poses = propose(probes, voters, coarse, apart, _PROPOSED)
-    columns = confirm(poses, probes, coarse, apart)
-    poses = _distinct(poses, scores_of(columns), source, 2 * apart)[:_REFINED]
-    poses, _, _ = refine(poses, probes, coarse, (1.5 * apart, 4 * spacing), (5, 0))
-    tight = 2.0 * spacing
-    fine = field_of(target.half, target.surface, target.normals, target.smooth, target.sight, 4 * spacing)
-    poses, _, _ = refine(poses, probes, fine, (4 * spacing, 2 * spacing), (6, 0))
-    poses = _distinct(poses, scores_of(confirm(poses, probes, fine, tight)), source, 2 * spacing)[:_FINAL]
-    whole = _probes(source.half, source, len(source.surface))
-    poses, information, residuals = refine(poses, whole, fine, (4 * spacing, 1.5 * spacing), (12, 10))
-    there, back = confirm(poses, probes, fine, tight), np.zeros((len(poses), 5))
-    if len(poses):
-        their = _probes(some, target, 2 * _SURFACE)
-        mine = field_of(source.half, source.surface, source.normals, source.smooth, source.sight, 4 * spacing)
-        back = confirm(np.linalg.inv(poses), their, mine, tight)
-    columns = np.stack([there, back], axis=1)
-    scores = scores_of(there) - back[:, 2] - 0.5 * back[:, 3]
-    order = np.argsort(-scores, kind="stable")
-    order = order[_distinct_rows(poses[order], source, 4 * spacing)]
-    return Found(poses[order], scores[order], columns[order], information[order], residuals[order])
+@dataclass(frozen=True, eq=False)
+class Match:
+    """A source and a target, with what verification and refinement ask of them.
+
+    Attributes
+    ----------
+    source, target : Prepared
+    spacing : float
+        Of the coarser of the two.
+    apart : float
+        Distance between the half-edges that propose.
+    few, whole : Probes
+        Of the source: some for verification, all for refinement.
+    fine : Field
+        Of the target.
+    """
+
+    source: Prepared
+    target: Prepared
+    spacing: float
+    apart: float
+    few: Probes
+    whole: Probes
+    fine: Field
+
+    @property
+    def tight(self) -> float:
+        """Tolerance of a verification."""
+        return _TIGHT * self.spacing
+
+    @property
+    def same(self) -> float:
+        """Poses that move the surface by less come to the same."""
+        return _REACH * self.spacing
+
+    @staticmethod
+    def of(source: Prepared, target: Prepared, least: float = 0.0) -> Match:
+        """Set a match up, at the spacing of the coarser cloud but at least another one, as models have none."""
+        spacing = max(source.spacing, target.spacing, least)
+        apart = min(min(source.size, target.size) / PARTS, _APART * spacing)
+        few = _probes(source.half.thinned(apart, _SOURCES), source, _SURFACE)
+        whole = _probes(source.half.thinned(spacing / 2, _MOST), source, len(source.surface))
+        return Match(source, target, spacing, apart, few, whole, _field(target, target.half, _REACH * spacing))
+
+    def coarse(self) -> Field:
+        """Return a field of the target in which half-edges lie apart."""
+        return _field(self.target, self.target.half.thinned(self.apart, _TARGETS), 1.5 * self.apart)
+
+    def refined(self, poses: np.ndarray, end: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Refine poses (see `refine`), until matches lie within a distance."""
+        return refine(poses, self.whole, self.fine, (max(_REACH * self.spacing, end), end), (12, 10))
+
+    def verified(self, poses: np.ndarray) -> Found:
+        """Verify poses by both clouds, best first, without those that come to the same."""
+        if not len(poses):
+            return Found(poses, np.empty(0), np.empty((0, 2, 5)))
+        there = confirm(poses, self.few, self.fine, self.tight)
+        mine = _field(self.source, self.source.half, _REACH * self.spacing)
+        theirs = _probes(self.target.half.thinned(self.apart, _TARGETS), self.target, 2 * _SURFACE)
+        back = confirm(np.linalg.inv(poses), theirs, mine, self.tight)
+        scores = scores_of(there) - back[:, THROUGH] - 0.5 * back[:, MISSING]
+        found = Found(poses, scores, np.stack([there, back], axis=1)).take(np.argsort(-scores, kind="stable"))
+        return found.take(distinct_rows(found.poses, self.whole, self.same))
+
+
+def search(match: Match, end: float, most: int = _FINAL) -> Found:
+    """Find the poses, at most so many, of a source in a target that edges and surface confirm."""
+    coarse, few, spacing = match.coarse(), match.few, match.spacing
+    poses = propose(few, _voters(few), coarse, match.apart, _PROPOSED)
+    scores = scores_of(confirm(poses, few, coarse, match.apart))
+    poses = _best(poses, scores, few, 2 * match.apart, max(_REFINED, 2 * most))
+    poses, _, _ = refine(poses, few, coarse, (1.5 * match.apart, _REACH * spacing), (5, 0))
+    poses, _, _ = refine(poses, few, match.fine, (_REACH * spacing, _TIGHT * spacing), (6, 0))
+    scores = scores_of(confirm(poses, few, match.fine, _TIGHT * spacing))
+    poses = _best(poses, scores, few, 2 * spacing, most)
+    return match.verified(match.refined(poses, end)[0])
 
 
 def _probes(half: HalfEdges, side: Prepared, most: int) -> Probes:
     """Make probes of half-edges and about so many places of a surface, each weighed by how rare its direction is."""
     rows = np.unique(np.linspace(0, len(side.surface) - 1, min(most, len(side.surface))).astype(np.int64))
-    shares = rareness(side.normals[rows][:, None]) if len(rows) <= 1000 else np.ones(len(rows))
-    weights = rareness(half.frames[:, :2]) if len(half) <= 1000 else np.ones(len(half))
+    shares = rareness(side.normals[rows][:, None]) if len(rows) <= 2 * _SURFACE else np.ones(len(rows))
+    weights = rareness(half.frames[:, :2]) if len(half) <= _TARGETS else np.ones(len(half))
     return probes_of(half, weights, side.surface[rows], side.normals[rows], shares)
+
+
+def _field(side: Prepared, half: HalfEdges, reach: float) -> Field:
+    """Make a field; between the places of its surface nothing is missed."""
+    return field_of(half, side.surface, side.normals, side.smooth, side.sight, reach, max(reach, 1.5 * side.gap))
 
 
 def _voters(probes: Probes) -> Probes:
@@ -81,22 +139,27 @@ def _voters(probes: Probes) -> Probes:
     return Probes(*(column[rows] for column in probes[:5]), *probes[5:])
 
 
-def _distinct(poses: np.ndarray, scores: np.ndarray, source: Prepared, shift: float) -> np.ndarray:
-    order = np.argsort(-scores, kind="stable")
-    return poses[order][_distinct_rows(poses[order], source, shift)]
+def _best(poses: np.ndarray, scores: np.ndarray, probes: Probes, shift: float, most: int) -> np.ndarray:
+    """Return the best poses that lie apart."""
+    poses = poses[np.argsort(-scores, kind="stable")]
+    return poses[distinct_rows(poses, probes, shift, most)]
 
 
-def _distinct_rows(poses: np.ndarray, source: Prepared, shift: float) -> np.ndarray:
-    """Rows of poses that lie by more than a shift from all before: as the source's points move, root mean square."""
-    middle = source.surface.mean(axis=0)
-    spread = np.cov((source.surface - middle).T, bias=True)
+def distinct_rows(poses: np.ndarray, probes: Probes, shift: float, most: int | None = None) -> np.ndarray:
+    """Rows of poses, at most so many, each of which lies by more than a shift from all before (`distances`)."""
     kept: list[int] = []
     for p in range(len(poses)):
-        if kept:
-            turn = poses[kept, :3, :3] - poses[p, :3, :3]
-            off = turn @ middle + poses[kept, :3, 3] - poses[p, :3, 3]
-            squared = np.einsum("pij,jk,pik->p", turn, spread, turn) + (off**2).sum(axis=1)
-            if (squared < shift**2).any():
-                continue
-        kept.append(p)
+        if len(kept) == most:
+            break
+        if not kept or (distances(poses[kept], poses[p], probes) > shift).all():
+            kept.append(p)
     return np.array(kept, np.int64)
+
+
+def distances(poses: np.ndarray, other: np.ndarray, probes: Probes) -> np.ndarray:
+    """How far poses (P, 4, 4) move the surface from where another one does, (P,): root mean square."""
+    middle = middle_of(probes)
+    spread = np.cov((probes.surface - middle).T, bias=True)
+    turn = poses[:, :3, :3] - other[:3, :3]
+    off = turn @ middle + poses[:, :3, 3] - other[:3, 3]
+    return np.sqrt(np.einsum("pij,jk,pik->p", turn, spread, turn) + (off**2).sum(axis=1))

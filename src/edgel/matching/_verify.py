@@ -50,20 +50,27 @@ class Field(NamedTuple):
     sight: Sight
 
 
-def probes_of(half: HalfEdges, weights: np.ndarray, surface: np.ndarray, normals: np.ndarray, shares: np.ndarray) -> Probes:
+def probes_of(
+    half: HalfEdges, weights: np.ndarray, surface: np.ndarray, normals: np.ndarray, shares: np.ndarray
+) -> Probes:
     """Make the arrays of a `Probes`."""
     turn = np.nan_to_num(half.turn, nan=-1.0)
     return Probes(half.places, half.frames, turn, half.bend, weights, surface, normals, shares)
 
 
 def field_of(
-    half: HalfEdges, surface: np.ndarray, normals: np.ndarray, smooth: np.ndarray, sight: Sight, reach: float
+    half: HalfEdges,
+    surface: np.ndarray,
+    normals: np.ndarray,
+    smooth: np.ndarray,
+    sight: Sight,
+    reach: float,
+    surface_reach: float,
 ) -> Field:
-    """Make a field that finds what is within reach."""
+    """Make a field that finds edges and surface within their reach."""
     turn, grid = np.nan_to_num(half.turn, nan=-1.0), build_grid(half.places, reach)
-    return Field(
-        half.places, half.frames, turn, half.bend, grid, surface, normals, smooth, build_grid(surface, reach), sight
-    )
+    surface_grid = build_grid(surface, surface_reach)
+    return Field(half.places, half.frames, turn, half.bend, grid, surface, normals, smooth, surface_grid, sight)
 
 
 @kernel

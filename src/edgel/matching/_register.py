@@ -1,0 +1,199 @@
+"""`edgel.register`: where a source lies in a target."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from edgel._stages import Stages
+from edgel.edges import Edges
+from edgel.matching._model import Model
+from edgel.matching._open import covariance_of, free_directions_of
+from edgel.matching._prepare import Prepared, prepare
+from edgel.matching._refine import middle_of, radius_of
+from edgel.matching._registration import Poses, Registration, not_found
+from edgel.matching._search import Found, Match, search
+from edgel.matching._symmetry import same_answers
+from edgel.matching._verify import EDGE, SURFACE, VISIBLE
+
+SURE = 0.1
+"""Margin from which on an answer can be relied on: `docs/matching.md` says how often such answers are right."""
+_LEAST_SCORE, _LEAST_FIT = 0.1, 0.25
+_ORDERS = 15.0  # spacings of either cloud that the other has to be large
+_FEWEST_EDGES, _FEWEST_PLACES = 6, 30
+_END = 1.5  # spacings
+_FLOOR = 0.02  # spacings: no distance is known better
+
+
+def register(
+    source: Any,
+    target: Any,
+    *,
+    initial: Any = None,
+    source_edges: Edges | None = None,
+    target_edges: Edges | None = None,
+    max_correspondence_distance: float | None = None,
+) -> Registration:
+    """Find where a source lies in a target: scan to scan and part to scene, from any start.
+
+    Every pair of half-edges that look alike proposes a pose (a half-edge is the border of a face: a place, the
+    direction into the face and its normal on the outside of the wedge, so that one pair fixes the rotation); other
+    edges vote; edges and surface of both clouds verify, what a sensor looked through counts against; planes refine, and
+    edges what planes leave free.
+
+    Parameters
+    ----------
+    source : (N, 3) or (H, W, 3) array_like, Cloud, an object that carries points, or Model
+    target : the same but a Model
+        In the same unit. Clouds with a viewpoint (`Cloud.viewpoint`) tell more: their sensor saw where nothing is.
+    initial : (4, 4) array_like, optional
+        T_target_source to begin from, within about 5 degrees and 5 spacings; nothing else is tried then.
+    source_edges, target_edges : Edges, optional
+        What `edgel.detect` found in them; default: it is asked, for clouds of which no sensor is known with
+        ``orient="outward"``.
+    max_correspondence_distance : float, optional
+        Distance of matches in the last steps of the refinement, in the clouds' unit. Default: 1.5 spacings of the
+        coarser cloud.
+
+    Returns
+    -------
+    Registration
+        `Registration.found` says whether there is an answer, `Registration.margin` how far it is ahead of the next.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a cloud carries no coordinates or fewer than 3 finite ones, if edges belong to another cloud or have unknown
+        sides, if `initial` is no rigid pose or the distance not above 0.
+
+    Examples
+    --------
+    >>> import numpy as np, edgel
+    >>> part = edgel.synth.sample(edgel.synth.stepped_block(), pattern="blue_noise", spacing=1.5).cloud.xyz
+    >>> moved = part[:, [1, 2, 0]] + [10.0, 20.0, 30.0]
+    >>> found = edgel.register(part, moved)
+    >>> bool(found.found), np.round(found.T_target_source[:3, 3], 1).tolist()
+    (True, [10.0, 20.0, 30.0])
+    """
+    initial = None if initial is None else _as_pose(initial)
+    if max_correspondence_distance is not None and not 0 < max_correspondence_distance < np.inf:
+        raise ValueError(f"max_correspondence_distance: expected a length above 0, got {max_correspondence_distance}")
+    stages = Stages()
+    with stages("source"):
+        mine = source.prepared if isinstance(source, Model) else prepare(source, source_edges, "source")
+    with stages("target"):
+        theirs = prepare(target, target_edges, "target")
+    symmetries = source.symmetries if isinstance(source, Model) else None
+    return register_prepared(mine, theirs, stages, initial, max_correspondence_distance, symmetries)
+
+
+def register_prepared(
+    source: Prepared,
+    target: Prepared,
+    stages: Stages,
+    initial: np.ndarray | None = None,
+    end: float | None = None,
+    symmetries: np.ndarray | None = None,
+) -> Registration:
+    """Find where a prepared source lies in a prepared target."""
+    obstacle = _obstacle(source, target)
+    if obstacle:
+        return not_found(obstacle, stages.seconds)
+    with stages("search"):
+        # The cloud with fewer edges is looked for in the other: more of them have a match.
+        swapped = initial is None and len(source.half) > len(target.half)
+        match = Match.of(target, source) if swapped else Match.of(source, target)
+        end = _END * match.spacing if end is None else end
+        found = search(match, end) if initial is None else match.verified(match.refined(initial[None], end)[0])
+    if not len(found.poses):
+        return not_found("no pose was proposed: too few edges look alike", stages.seconds)
+    with stages("answer"):
+        return _answer(match, found, swapped, end, stages, "edges" if initial is None else "initial", symmetries)
+
+
+def _answer(
+    match: Match,
+    found: Found,
+    swapped: bool,
+    end: float,
+    stages: Stages,
+    method: str,
+    symmetries: np.ndarray | None,
+) -> Registration:
+    """Say what was found, in the frames of the source and the target that were asked for."""
+    (pose, *_), score = found.poses, float(found.scores[0])
+    _, information, residuals = match.refined(pose[None], end)
+    (weight, squares), information = residuals[0], information[0]
+    free = free_directions_of(match, pose, information, weight)
+    same, group = same_answers(match, found, free, swapped, symmetries)
+    others = found.scores[~same]
+    margin = 1.0 if not len(others) else float(np.clip((score - others[0]) / max(score, 1e-9), 0, 1))
+    turned = found.poses if not swapped else np.linalg.inv(found.poses)
+    alternatives = Poses(turned[1:], found.scores[1:])
+    there = found.columns[0, 1 if swapped else 0]
+    fitness = float(there[SURFACE] / max(there[VISIBLE], 1e-9))
+    doubt = _doubt(found)
+    if doubt:
+        return not_found(doubt, stages.seconds, Poses(turned, found.scores))
+    scale = np.append(np.full(3, 1 / radius_of(match.whole)), np.ones(3))
+    variance = max(squares / max(weight, 1e-9), (_FLOOR * match.spacing) ** 2)
+    covariance = covariance_of(information, variance, free) * np.outer(scale, scale)
+    center = pose[:3, :3] @ middle_of(match.whole) + pose[:3, 3]
+    free = free * scale
+    if swapped:  # a small move of the target in the source, seen from the target, is the opposite move
+        back = np.kron(np.eye(2), turned[0, :3, :3])
+        covariance, free = back @ covariance @ back.T, -free @ back.T
+        center = turned[0, :3, :3] @ center + turned[0, :3, 3]
+    return Registration(
+        T_target_source=turned[0],
+        found=True,
+        reason="",
+        score=score,
+        fitness=min(fitness, 1.0),
+        edge_fitness=float(found.columns[0, :, EDGE].max()),
+        rmse=float(np.sqrt(squares / max(weight, 1e-9))),
+        margin=margin,
+        alternatives=alternatives,
+        symmetries=group,
+        free_directions=free,
+        center=center,
+        covariance=covariance,
+        method=method,
+        seconds=stages.seconds,
+    )
+
+
+def _obstacle(source: Prepared, target: Prepared) -> str:
+    """Say why two clouds cannot be compared at all; empty if they can."""
+    for side, other, name, its in ((source, target, "source", "target's"), (target, source, "target", "source's")):
+        if side.size < _ORDERS * other.spacing:
+            return (
+                f"the {name} is {side.size:.3g} large, the {its} points lie {other.spacing:.3g} apart: are both in the same "
+                "unit?"
+            )
+        if len(side.surface) < _FEWEST_PLACES:
+            return f"the {name} has too little surface: {len(side.surface)} places of it lie on a plane"
+        if len(side.half) < _FEWEST_EDGES:
+            return f"the {name} has too few edges: {len(side.half)}"
+    return ""
+
+
+def _doubt(found: Found) -> str:
+    """Say why the best pose is not believed; empty if it is."""
+    score = float(found.scores[0])
+    if score < _LEAST_SCORE:
+        return f"no pose is confirmed by edges and surface: the best scores {score:.2f}, {_LEAST_SCORE:g} is asked"
+    return ""
+
+
+def _as_pose(initial: Any) -> np.ndarray:
+    pose = np.asarray(initial, np.float64)
+    if pose.shape != (4, 4) or not np.isfinite(pose).all():
+        raise ValueError(f"initial: expected a finite (4, 4) pose, got shape {pose.shape}")
+    rigid = np.abs(pose[:3, :3] @ pose[:3, :3].T - np.eye(3)).max() < 1e-3 and np.linalg.det(pose[:3, :3]) > 0
+    if not rigid or np.abs(pose[3] - (0, 0, 0, 1)).max() > 1e-6:
+        raise ValueError(
+            "initial: expected a rotation and a shift, T_target_source; this one scales, shears or mirrors"
+        )
+    return pose
