@@ -157,7 +157,7 @@ def make(row: str, noise: float, number: int, *, held: int = 0) -> Pair:
     h = spacing_of(solid)
     maker = {"part to view": _part_to_view, "clutter": _clutter, "crops": _crops}.get(row, _view_to_view)
     while True:
-        source, target, pose, frame = maker(solid, h, noise, rng)
+        source, target, pose, frame = maker(name, h, noise, rng)
         if overlap(source, target, pose, h) >= MIN_OVERLAP[row]:
             break
     inverse = np.linalg.inv(frame)
@@ -178,9 +178,10 @@ def _view(
 
 
 def _view_to_view(
-    solid: Solid, h: float, noise: float, rng: np.random.Generator
+    name: str, h: float, noise: float, rng: np.random.Generator
 ) -> tuple[Cloud, Cloud, np.ndarray, np.ndarray]:
     """Two views 25 to 70 degrees apart."""
+    solid = solid_of(name)
     first = direction(rng)
     across = np.cross(first, direction(rng))
     second = turn_about(across, np.radians(rng.uniform(25, 70)))[:3, :3] @ first
@@ -189,9 +190,10 @@ def _view_to_view(
 
 
 def _part_to_view(
-    solid: Solid, h: float, noise: float, rng: np.random.Generator
+    name: str, h: float, noise: float, rng: np.random.Generator
 ) -> tuple[Cloud, Cloud, np.ndarray, np.ndarray]:
     """The whole part, sampled without noise and with its normals as from its mesh, to a view."""
+    solid = solid_of(name)
     part = synth.sample(solid, pattern="blue_noise", spacing=h, seed=int(rng.integers(2**31)))
     b = _view(solid, h, noise, direction(rng), rng)
     frame = random_pose(rng, solid.size)
@@ -199,10 +201,9 @@ def _part_to_view(
     return cloud, b.cloud, b.pose @ np.linalg.inv(frame), frame
 
 
-def _crops(
-    solid: Solid, h: float, noise: float, rng: np.random.Generator
-) -> tuple[Cloud, Cloud, np.ndarray, np.ndarray]:
+def _crops(name: str, h: float, noise: float, rng: np.random.Generator) -> tuple[Cloud, Cloud, np.ndarray, np.ndarray]:
     """Two samples of the whole part, of each of which a plane cuts off a third; no sensor is known."""
+    solid = solid_of(name)
     clouds, frames = [], []
     for _ in range(2):
         xyz = synth.sample(solid, pattern="blue_noise", spacing=h, noise=noise, seed=int(rng.integers(2**31))).cloud.xyz
@@ -214,10 +215,11 @@ def _crops(
 
 
 def _clutter(
-    solid: Solid, h: float, noise: float, rng: np.random.Generator
+    name: str, h: float, noise: float, rng: np.random.Generator
 ) -> tuple[Cloud, Cloud, np.ndarray, np.ndarray]:
     """A view of the part, to one of it on a table among three others, with 1 % outliers."""
-    others = [solid_of(n) for n in rng.choice(PLANAR + ROUND, 3, replace=False)]
+    solid = solid_of(name)
+    others = [solid_of(n) for n in rng.choice([n for n in PLANAR + ROUND if n != name], 3, replace=False)]
     pitch = 0.9 * solid.size
     corners, faces, normals, placed = [], [], [], []
     for k, one in enumerate([solid, *others]):

@@ -60,6 +60,8 @@ def build_grid(places: np.ndarray, reach: float) -> Grid:
     key, row = np.concatenate(keys), np.concatenate(rows)
     order = np.lexsort((row, key))
     key, row = key[order], row[order]
+    once = (np.diff(key, prepend=-1) != 0) | (np.diff(row, prepend=-1) != 0)  # cells of one key may share a place
+    key, row = key[once], row[once]
     start = np.flatnonzero(np.diff(key, prepend=-1))
     size = 1 << max(int(4 * len(start)).bit_length(), 4)
     table = (np.full(size, -1), np.zeros(size, np.int64), np.zeros(size, np.int64))

@@ -188,7 +188,7 @@ def _count_alike(start, stop, directions, cosine, count):
 
 
 def rareness(directions: np.ndarray) -> np.ndarray:
-    """Weigh rows of directions (M, D, 3) by how rare they are, (M,), 1 on average: what is common tells poses little."""
+    """Weigh rows of directions (M, D, 3) by how rare they are, (M,), 1 on average: what is common tells little."""
     count = np.empty(len(directions), np.int64)
     run_slices(_count_alike, len(directions), np.ascontiguousarray(directions), _ALIKE, count, size=256)
     weight = 1 / np.sqrt(count)

@@ -79,7 +79,7 @@ class Model:
         size = float(np.linalg.norm(np.ptp(self.corners.reshape(-1, 3), axis=0)))
         places, normals = spread_over(self.corners, self.normals, MOST_SURFACE)
         area = float(np.linalg.norm(np.cross(*np.diff(self.corners, axis=1).transpose(1, 0, 2)), axis=1).sum() / 2)
-        rows = thin_to(places, MOST_SURFACE, np.sqrt(area / MOST_SURFACE))
+        rows = thin_to(places, MOST_SURFACE, np.sqrt(area / len(places)))
         places, normals = places[rows], normals[rows]
         smooth = away_from(places, half.places, _SMOOTH * size) >= _SMOOTH * size
         gap = float(np.sqrt(area / len(places)))

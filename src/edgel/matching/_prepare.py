@@ -115,6 +115,6 @@ def _check_edges(edges: Edges, count: int, name: str) -> None:
         )
     if edges.orientation == UNKNOWN and (edges.kind & EdgeKind.CREASE).any():
         raise ValueError(
-            f"{name}_edges: nobody knows which side of their faces is outside; find them with orient='outward', or give "
-            "the cloud its viewpoint"
+            f"{name}_edges: nobody knows which side of their faces is outside; find them with orient='outward', or "
+            "give the cloud its viewpoint"
         )

@@ -39,7 +39,7 @@ def _equations(pose, probes, field, centre, radius, reach, light, matrix, right)
     edge_weight, weight, squares = 0.0, 0.0, 0.0
     for e in range(len(probes.weights)):
         x, y, z = move(pose, probes.places[e])
-        fit, found = find_edge(field, pose, x, y, z, probes.frames[e], probes.turn[e], probes.bend[e], reach)
+        _, found = find_edge(field, pose, x, y, z, probes.frames[e], probes.turn[e], probes.bend[e], reach)
         if found < 0:
             continue
         offset[0], offset[1], offset[2] = x - centre[0], y - centre[1], z - centre[2]

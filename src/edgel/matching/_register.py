@@ -22,6 +22,7 @@ SURE = 0.1
 _LEAST_SCORE, _LEAST_FIT = 0.1, 0.25
 _ORDERS = 15.0  # spacings of either cloud that the other has to be large
 _FEWEST_EDGES, _FEWEST_PLACES = 6, 30
+_PLANE = 0.95  # cosine of normals that look the same way, and their share
 _END = 1.5  # spacings
 _FLOOR = 0.02  # spacings: no distance is known better
 
@@ -169,14 +170,22 @@ def _obstacle(source: Prepared, target: Prepared) -> str:
     for side, other, name, its in ((source, target, "source", "target's"), (target, source, "target", "source's")):
         if side.size < _ORDERS * other.spacing:
             return (
-                f"the {name} is {side.size:.3g} large, the {its} points lie {other.spacing:.3g} apart: are both in the same "
-                "unit?"
+                f"the {name} is {side.size:.3g} large, the {its} points lie {other.spacing:.3g} apart: are both in the "
+                "same unit?"
             )
         if len(side.surface) < _FEWEST_PLACES:
             return f"the {name} has too little surface: {len(side.surface)} places of it lie on a plane"
         if len(side.half) < _FEWEST_EDGES:
             return f"the {name} has too few edges: {len(side.half)}"
+        if not side.half.is_crease.any() and _is_plane(side):
+            return f"the {name} is one plane without a crease, which fits anywhere on another"
     return ""
+
+
+def _is_plane(side: Prepared) -> bool:
+    """Whether all of a surface looks the same way."""
+    middle = side.normals.mean(axis=0)
+    return bool((side.normals @ middle > _PLANE * np.linalg.norm(middle)).mean() > _PLANE)
 
 
 def _doubt(found: Found) -> str:

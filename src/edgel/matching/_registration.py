@@ -54,8 +54,8 @@ class Registration:
     alternatives : Poses
         The other poses that were verified.
     symmetries : (S, 4, 4) float64
-        Moves of the source that leave it as it is, the identity first: of a model all of them, of a cloud those by which
-        alternatives differ from the best pose.
+        Moves of the source that leave it as it is, the identity first: of a model all of them, of a cloud those by
+        which alternatives differ from the best pose.
     free_directions : (F, 6) float64
         Directions in which the pose is open, as a slide along a plane is: a rotation vector about `center` and a shift,
         both in the target's frame; moving the source along one of unit length changes its points by about as much.
@@ -97,7 +97,7 @@ class Registration:
 
     @property
     def position_std(self) -> float:
-        """Standard deviation of where the middle of the source lies, in the cloud's unit (root of the sum over axes)."""
+        """Standard deviation of where the middle of the source lies, in the cloud's unit (all axes together)."""
         return float(np.sqrt(np.trace(self.covariance[3:, 3:])))
 
 

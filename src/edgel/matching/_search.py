@@ -15,6 +15,7 @@ from edgel.matching._verify import MISSING, THROUGH, Field, Probes, confirm, fie
 PARTS = 28  # of the smaller cloud's size: how far apart half-edges are that propose
 _APART = 8.0  # spacings, at most
 _SOURCES, _TARGETS, _VOTERS, _SURFACE = 300, 2400, 64, 250
+_PAIRS = 250_000  # that are tried, by fewer of the source where the target has many
 _MOST = 3000  # half-edges that refine
 _PROPOSED, _REFINED, _FINAL = 1500, 80, 12
 _REACH, _TIGHT, _END = 4.0, 2.0, 1.5  # spacings: matches at first, of a verification, and in the end
@@ -110,7 +111,8 @@ class Match:
 def search(match: Match, end: float, most: int = _FINAL) -> Found:
     """Find the poses, at most so many, of a source in a target that edges and surface confirm."""
     coarse, few, spacing = match.coarse(), match.few, match.spacing
-    poses = propose(few, _voters(few), coarse, match.apart, _PROPOSED)
+    chosen = _some(few, max(_PAIRS // max(len(coarse.turn), 1), _VOTERS))
+    poses = propose(chosen, _some(few, _VOTERS), coarse, match.apart, _PROPOSED)
     scores = scores_of(confirm(poses, few, coarse, match.apart))
     poses = _best(poses, scores, few, 2 * match.apart, max(_REFINED, 2 * most))
     poses, _, _ = refine(poses, few, coarse, (1.5 * match.apart, _REACH * spacing), (5, 0))
@@ -133,9 +135,9 @@ def _field(side: Prepared, half: HalfEdges, reach: float) -> Field:
     return field_of(half, side.surface, side.normals, side.smooth, side.sight, reach, max(reach, 1.5 * side.gap))
 
 
-def _voters(probes: Probes) -> Probes:
-    """Choose the half-edges that vote, one among others all over the part."""
-    rows = np.random.default_rng(0).permutation(len(probes.weights))[:_VOTERS]
+def _some(probes: Probes, most: int) -> Probes:
+    """Choose at most so many of the half-edges, all over the part, in no order."""
+    rows = np.random.default_rng(0).permutation(len(probes.weights))[:most]
     return Probes(*(column[rows] for column in probes[:5]), *probes[5:])
 
 

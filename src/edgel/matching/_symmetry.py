@@ -6,7 +6,7 @@ import numpy as np
 
 from edgel.matching._open import rotation_of, twist_between, vector_of
 from edgel.matching._prepare import Prepared
-from edgel.matching._search import Found, Match, distances, search
+from edgel.matching._search import Found, Match, distances, distinct_rows, search
 from edgel.matching._verify import EDGE, SURFACE, confirm
 
 TURNS = 72
@@ -15,6 +15,7 @@ _FINE = 150.0  # of the size: spacing at which a part is matched with itself
 _SURFACE, _EDGES = 0.93, 0.85  # of the shares that the part itself has, which a symmetry leaves
 _MOST = 60  # symmetries that are looked for
 _ROUND = 30  # and from how many on it is any turn about an axis
+_TRIED = 1000  # products of symmetries that are tried at a time
 _RIVAL = 0.5  # of the best score, from where on it is asked whether an alternative is the same by symmetry
 
 
@@ -22,12 +23,17 @@ def symmetries_of(part: Prepared) -> np.ndarray:
     """Find the moves (S, 4, 4) that leave a part as it is, the identity first; any turn about an axis as `TURNS`."""
     match = Match.of(part, part, part.size / _FINE)
     found = search(match, 1.5 * match.spacing, most=_MOST)
-    moves = found.poses[_leave(match, found.poses)]
-    if len(moves):
-        moves = moves[distances(moves, np.eye(4), match.whole) > match.same]
+    moves = np.eye(4)[None]
+    new = found.poses[_leave(match, found.poses)]
+    while len(new) and len(moves) < _ROUND:  # what two of them do one after the other is a symmetry, too
+        count = len(moves)
+        moves = np.concatenate([moves, new])
+        moves = moves[distinct_rows(moves, match.whole, match.same)]
+        new = np.einsum("aij,bjk->abik", moves, moves).reshape(-1, 4, 4)[: _TRIED if len(moves) > count else 0]
+        new = new[_leave(match, new)]
     if len(moves) >= _ROUND:
-        moves = _turns(moves, part.surface.mean(axis=0))
-    return np.concatenate([np.eye(4)[None], moves])
+        moves = np.concatenate([moves[:1], _turns(moves[1:], part.surface.mean(axis=0))])
+    return moves
 
 
 def same_answers(
@@ -84,7 +90,7 @@ def _leave(match: Match, moves: np.ndarray) -> np.ndarray:
 
 
 def _turns(moves: np.ndarray, middle: np.ndarray) -> np.ndarray:
-    """Return turns about the axis that most moves keep, all but that by nothing; and from the other side, if one does."""
+    """Return turns about the axis that most moves keep, all but that by nothing; over, too, if a move does that."""
     vectors = np.array([vector_of(move[:3, :3]) for move in moves])
     axes = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
     axis = axes[np.argmax((np.abs(axes @ axes.T) > 0.99).sum(axis=1))]
