@@ -13,13 +13,13 @@ from edgel.matching._open import covariance_of, free_directions_of
 from edgel.matching._prepare import Prepared, prepare
 from edgel.matching._refine import middle_of, radius_of
 from edgel.matching._registration import Poses, Registration, not_found
-from edgel.matching._search import Found, Match, search
+from edgel.matching._search import Found, Match, has_more_edges, search
 from edgel.matching._symmetry import same_answers
 from edgel.matching._verify import EDGE, SURFACE, VISIBLE
 
 SURE = 0.1
 """Margin from which on an answer can be relied on: `docs/matching.md` says how often such answers are right."""
-_LEAST_SCORE, _LEAST_FIT = 0.1, 0.25
+_LEAST_SCORE, _LEAST_FIT = 0.1, 0.5  # parts that share nothing reach .19 and .5, rarely both
 _ORDERS = 15.0  # spacings of either cloud that the other has to be large
 _FEWEST_EDGES, _FEWEST_PLACES = 6, 30
 _PLANE = 0.95  # cosine of normals that look the same way, and their share
@@ -103,7 +103,7 @@ def register_prepared(
         return not_found(obstacle, stages.seconds)
     with stages("search"):
         # The cloud with fewer edges is looked for in the other: more of them have a match.
-        swapped = initial is None and len(source.half) > len(target.half)
+        swapped = initial is None and has_more_edges(source, target)
         match = Match.of(target, source) if swapped else Match.of(source, target)
         end = _END * match.spacing if end is None else end
         found = search(match, end) if initial is None else match.verified(match.refined(initial[None], end)[0])
@@ -132,9 +132,9 @@ def _answer(
     margin = 1.0 if not len(others) else float(np.clip((score - others[0]) / max(score, 1e-9), 0, 1))
     turned = found.poses if not swapped else np.linalg.inv(found.poses)
     alternatives = Poses(turned[1:], found.scores[1:])
-    there = found.columns[0, 1 if swapped else 0]
+    there = found.columns[0, 0]
     fitness = float(there[SURFACE] / max(there[VISIBLE], 1e-9))
-    doubt = _doubt(found)
+    doubt = _doubt(score, fitness)
     if doubt:
         return not_found(doubt, stages.seconds, Poses(turned, found.scores))
     scale = np.append(np.full(3, 1 / radius_of(match.whole)), np.ones(3))
@@ -151,7 +151,7 @@ def _answer(
         found=True,
         reason="",
         score=score,
-        fitness=min(fitness, 1.0),
+        fitness=fitness,
         edge_fitness=float(found.columns[0, :, EDGE].max()),
         rmse=float(np.sqrt(squares / max(weight, 1e-9))),
         margin=margin,
@@ -188,9 +188,10 @@ def _is_plane(side: Prepared) -> bool:
     return bool((side.normals @ middle > _PLANE * np.linalg.norm(middle)).mean() > _PLANE)
 
 
-def _doubt(found: Found) -> str:
+def _doubt(score: float, fitness: float) -> str:
     """Say why the best pose is not believed; empty if it is."""
-    score = float(found.scores[0])
+    if fitness < _LEAST_FIT:
+        return f"no pose is confirmed: the best lets {fitness:.0%} of the surface lie where it should, half is asked"
     if score < _LEAST_SCORE:
         return f"no pose is confirmed by edges and surface: the best scores {score:.2f}, {_LEAST_SCORE:g} is asked"
     return ""

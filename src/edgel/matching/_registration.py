@@ -42,9 +42,10 @@ class Registration:
     score : float
         How far the pose is confirmed, 1 at most: the share of edges and surface found, less what speaks against it.
     fitness : float
-        Share, 0 to 1, of the source's surface that lies on the target's; what is hidden behind the target is left out.
+        Share, 0 to 1, of a surface that lies on the other cloud's, by how near; what is hidden behind that is left out.
+        The surface is that of the cloud with fewer edges, which is the one looked for.
     edge_fitness : float
-        Share, 0 to 1, of the edges found in the other cloud, of that cloud of which more are found.
+        Share, 0 to 1, of the edges found in the other cloud, by how near; of that cloud of which more are found.
     rmse : float
         Root of the mean squared distance of the source's surface from the target's where they lie on each other, in the
         cloud's unit.

@@ -82,7 +82,7 @@ class Match:
     def of(source: Prepared, target: Prepared, least: float = 0.0) -> Match:
         """Set a match up, at the spacing of the coarser cloud but at least another one, as models have none."""
         spacing = max(source.spacing, target.spacing, least)
-        apart = min(min(source.size, target.size) / PARTS, _APART * spacing)
+        apart = _apart(source, target, spacing)
         few = _probes(source.half.thinned(apart, _SOURCES), source, _SURFACE)
         whole = _probes(source.half.thinned(spacing / 2, _MOST), source, len(source.surface))
         return Match(source, target, spacing, apart, few, whole, _field(target, target.half, _REACH * spacing))
@@ -106,6 +106,16 @@ class Match:
         scores = scores_of(there) - back[:, THROUGH] - 0.5 * back[:, MISSING]
         found = Found(poses, scores, np.stack([there, back], axis=1)).take(np.argsort(-scores, kind="stable"))
         return found.take(distinct_rows(found.poses, self.whole, self.same))
+
+
+def _apart(source: Prepared, target: Prepared, spacing: float) -> float:
+    return min(min(source.size, target.size) / PARTS, _APART * spacing)
+
+
+def has_more_edges(source: Prepared, target: Prepared) -> bool:
+    """Tell whether a source has more edges than a target, by length."""
+    apart = _apart(source, target, max(source.spacing, target.spacing))
+    return len(source.half.thinned(apart, _TARGETS)) > len(target.half.thinned(apart, _TARGETS))
 
 
 def search(match: Match, end: float, most: int = _FINAL) -> Found:
