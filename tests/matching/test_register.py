@@ -215,3 +215,29 @@ def test_a_cloud_object_with_a_viewpoint_is_looked_through():
     assert np.mean(np.array(said[2]) == 1) > 0.9
     assert look(sight, 1e3, 1e3, 10.0, 1.0) == 0
     assert isinstance(scene, Cloud)
+
+
+def blob(seed, count=7000):
+    """A smooth body with bumps of its own, points all over it."""
+    rng = np.random.default_rng(seed)
+    way = rng.standard_normal((count, 3))
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    x, y, z = way.T
+    return (25 + 6 * x * y + 5 * z**3 + 4 * np.sin(3 * y) * x + 3 * y * z)[:, None] * way
+
+
+def test_a_smooth_body_is_found_by_its_surface():
+    answer = edgel.register(blob(0), apply(MOVED, blob(1)))
+    assert answer.found
+    assert answer.method == "surface"
+    assert np.linalg.norm(apply(answer.T_target_source, blob(0)) - apply(MOVED, blob(0)), axis=1).max() < 0.5
+
+
+def test_a_ball_may_turn():
+    way = blob(2) / np.linalg.norm(blob(2), axis=1, keepdims=True)
+    other = blob(3) / np.linalg.norm(blob(3), axis=1, keepdims=True)
+    answer = edgel.register(30 * way, 30 * other + [100.0, 0, 0])
+    assert answer.found
+    assert len(answer.free_directions) == 3
+    assert np.abs(answer.free_directions[:, 3:]).max() < 0.1
+    assert np.allclose(apply(answer.T_target_source, np.zeros((1, 3))), [100, 0, 0], atol=0.1)

@@ -43,6 +43,11 @@ class HalfEdges:
     def __len__(self) -> int:
         return len(self.places)
 
+    @staticmethod
+    def none() -> HalfEdges:
+        """Return no half-edges."""
+        return HalfEdges(np.empty((0, 3)), np.empty((0, 3, 3)), np.empty(0), np.empty(0, np.int64))
+
     def take(self, rows: np.ndarray) -> HalfEdges:
         """Return some of them, (K,) int or (M,) bool."""
         return HalfEdges(self.places[rows], self.frames[rows], self.turn[rows], self.bend[rows])

@@ -21,7 +21,8 @@ SURE = 0.1
 """Margin from which on an answer can be relied on: `docs/matching.md` says how often such answers are right."""
 _LEAST_SCORE, _LEAST_FIT = 0.1, 0.5  # parts that share nothing reach .19 and .5, rarely both
 _ORDERS = 15.0  # spacings of either cloud that the other has to be large
-_FEWEST_EDGES, _FEWEST_PLACES = 6, 30
+_FEWEST_PLACES = 30
+_FEW_EDGES = 24  # half-edges of a search, with fewer of which the surface proposes poses
 _PLANE = 0.95  # cosine of normals that look the same way, and their share
 _END = 1.5  # spacings
 _FLOOR = 0.02  # spacings: no distance is known better
@@ -106,11 +107,29 @@ def register_prepared(
         swapped = initial is None and has_more_edges(source, target)
         match = Match.of(target, source) if swapped else Match.of(source, target)
         end = _END * match.spacing if end is None else end
-        found = search(match, end) if initial is None else match.verified(match.refined(initial[None], end)[0])
+        if initial is None:
+            found, method = _searched(match, end)
+        else:
+            found, method = match.verified(match.refined(initial[None], end)[0]), "initial"
     if not len(found.poses):
-        return not_found("no pose was proposed: too few edges look alike", stages.seconds)
+        return not_found("no pose was proposed: neither edges nor surfaces look alike", stages.seconds)
     with stages("answer"):
-        return _answer(match, found, swapped, end, stages, "edges" if initial is None else "initial", symmetries)
+        return _answer(match, found, swapped, end, stages, method, symmetries)
+
+
+def _searched(match: Match, end: float) -> tuple[Found, str]:
+    """Search by edges, and by the surface where there are few or they find nothing to be believed; who found it."""
+    by_edges = None
+    if min(len(match.few.turn), len(match.target.half)) >= _FEW_EDGES:
+        by_edges = search(match, end)
+        if len(by_edges.poses) and not _doubt(by_edges):
+            return by_edges, "edges"
+    by_surface = search(match, end, by_surface=True)
+    if by_edges is None or not len(by_edges.poses):
+        return by_surface, "surface"
+    if len(by_surface.poses) and by_surface.scores[0] > by_edges.scores[0]:
+        return by_surface, "surface"
+    return by_edges, "edges"
 
 
 def _answer(
@@ -132,9 +151,7 @@ def _answer(
     margin = 1.0 if not len(others) else float(np.clip((score - others[0]) / max(score, 1e-9), 0, 1))
     turned = found.poses if not swapped else np.linalg.inv(found.poses)
     alternatives = Poses(turned[1:], found.scores[1:])
-    there = found.columns[0, 0]
-    fitness = float(there[SURFACE] / max(there[VISIBLE], 1e-9))
-    doubt = _doubt(score, fitness)
+    doubt = _doubt(found)
     if doubt:
         return not_found(doubt, stages.seconds, Poses(turned, found.scores))
     scale = np.append(np.full(3, 1 / radius_of(match.whole)), np.ones(3))
@@ -151,7 +168,7 @@ def _answer(
         found=True,
         reason="",
         score=score,
-        fitness=fitness,
+        fitness=_fitness(found),
         edge_fitness=float(found.columns[0, :, EDGE].max()),
         rmse=float(np.sqrt(squares / max(weight, 1e-9))),
         margin=margin,
@@ -175,8 +192,6 @@ def _obstacle(source: Prepared, target: Prepared) -> str:
             )
         if len(side.surface) < _FEWEST_PLACES:
             return f"the {name} has too little surface: {len(side.surface)} places of it lie on a plane"
-        if len(side.half) < _FEWEST_EDGES:
-            return f"the {name} has too few edges: {len(side.half)}"
         if not side.half.is_crease.any() and _is_plane(side):
             return f"the {name} is one plane without a crease, which fits anywhere on another"
     return ""
@@ -188,8 +203,15 @@ def _is_plane(side: Prepared) -> bool:
     return bool((side.normals @ middle > _PLANE * np.linalg.norm(middle)).mean() > _PLANE)
 
 
-def _doubt(score: float, fitness: float) -> str:
+def _fitness(found: Found) -> float:
+    """Share of the surface looked for that lies where it should, at the best pose."""
+    there = found.columns[0, 0]
+    return float(there[SURFACE] / max(there[VISIBLE], 1e-9))
+
+
+def _doubt(found: Found) -> str:
     """Say why the best pose is not believed; empty if it is."""
+    score, fitness = float(found.scores[0]), _fitness(found)
     if fitness < _LEAST_FIT:
         return f"no pose is confirmed: the best lets {fitness:.0%} of the surface lie where it should, half is asked"
     if score < _LEAST_SCORE:

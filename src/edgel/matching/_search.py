@@ -10,6 +10,7 @@ from edgel.matching._half_edges import HalfEdges, rareness
 from edgel.matching._hypotheses import propose
 from edgel.matching._prepare import Prepared
 from edgel.matching._refine import middle_of, refine
+from edgel.matching._surface_pairs import propose_by_surface
 from edgel.matching._verify import MISSING, THROUGH, Field, Probes, confirm, field_of, probes_of, scores_of
 
 PARTS = 28  # of the smaller cloud's size: how far apart half-edges are that propose
@@ -118,11 +119,19 @@ def has_more_edges(source: Prepared, target: Prepared) -> bool:
     return len(source.half.thinned(apart, _TARGETS)) > len(target.half.thinned(apart, _TARGETS))
 
 
-def search(match: Match, end: float, most: int = _FINAL) -> Found:
-    """Find the poses, at most so many, of a source in a target that edges and surface confirm."""
+def search(match: Match, end: float, most: int = _FINAL, *, by_surface: bool = False) -> Found:
+    """Find the poses, at most so many, of a source in a target that edges and surface confirm.
+
+    Pairs of half-edges propose them, or pairs of places on the surface.
+    """
     coarse, few, spacing = match.coarse(), match.few, match.spacing
-    chosen = _some(few, max(_PAIRS // max(len(coarse.turn), 1), _VOTERS))
-    poses = propose(chosen, _some(few, _VOTERS), coarse, match.apart, _PROPOSED)
+    if by_surface:
+        poses = propose_by_surface(match.source, match.target)
+        votes = scores_of(confirm(poses, _probes(HalfEdges.none(), match.source, _VOTERS), coarse, match.apart))
+        poses = poses[np.argsort(-votes, kind="stable")[:_PROPOSED]]
+    else:
+        chosen = _some(few, max(_PAIRS // max(len(coarse.turn), 1), _VOTERS))
+        poses = propose(chosen, _some(few, _VOTERS), coarse, match.apart, _PROPOSED)
     scores = scores_of(confirm(poses, few, coarse, match.apart))
     poses = _best(poses, scores, few, 2 * match.apart, max(_REFINED, 2 * most))
     poses, _, _ = refine(poses, few, coarse, (1.5 * match.apart, _REACH * spacing), (5, 0))
