@@ -17,6 +17,7 @@ from edgel._cli.errors import ExitCode, Failure, exit_codes, failing_as
 from edgel._cli.jobs import Job
 from edgel._cli.outcome import Told, cautions, notices
 from edgel._cli.output import count, length, time_rows
+from edgel._neighbors.spacing import median_spacing
 from edgel._objects import NORMALS
 from edgel._stages import Stages
 from edgel.cloud import Cloud
@@ -37,6 +38,7 @@ Examples:
 """
 
 _GROUP = "Match"
+_LIFT = 1.0  # spacings of the scan
 _COLORS = ((128, 136, 150), (235, 110, 20))  # of the scan and of what lies in it
 
 
@@ -119,11 +121,11 @@ def _match(wanted: _Wanted, job: Job, progress: Callable[[str], None]) -> Told:
     with stages("writing"), failing_as(ExitCode.OUTPUT, wanted.drawing or job.target):
         lost = jobs.write(job, placed)
         if wanted.drawing is not None:
-            save(wanted.drawing, picture(_together(scan, placed), color_by="rgb"))
+            save(wanted.drawing, picture(_together(scan, _drawn(part, found, scan)), color_by="rgb"))
     facts = {"input": job.source, "part": wanted.part, "output": job.output, "picture": wanted.drawing}
     facts |= {"notices": notices(scan), "found": [_facts(one) for one in found], "seconds": stages.seconds}
     written = [f"{job.target}: the part in place, {count(len(placed))} points"] if job.output else []
-    written += [f"{wanted.drawing}: the scan and, in orange, the part in place"] if wanted.drawing else []
+    written += [f"{wanted.drawing}: the scan and, in orange, what lies in it"] if wanted.drawing else []
     return Told(
         facts,
         title=f"{Path(wanted.part).name} in {job.name}",
@@ -145,7 +147,17 @@ def _is_model(part: str) -> bool:
 
 def _placed(part: Model | Cloud, found: list[Registration]) -> Cloud:
     """Return the points of a part, moved to where it was found, once for each instance."""
-    cloud = part.to_cloud() if isinstance(part, Model) else replace(part, shape=None, viewpoint=None)
+    return _moved(part.to_cloud() if isinstance(part, Model) else part, found)
+
+
+def _drawn(part: Model | Cloud, found: list[Registration], scan: Cloud) -> Cloud:
+    """Return what a picture shows of a part in place: the creases of a model, a little above the scan, or the cloud."""
+    return _moved(Cloud(part.creases(_LIFT * median_spacing(scan))) if isinstance(part, Model) else part, found)
+
+
+def _moved(cloud: Cloud, found: list[Registration]) -> Cloud:
+    """Move points, and their normals, to where they were found, once for each instance."""
+    cloud = replace(cloud, shape=None, viewpoint=None)
     normals = all(name in cloud.attributes for name in NORMALS)
     clouds = []
     for one in found:
@@ -160,7 +172,7 @@ def _placed(part: Model | Cloud, found: list[Registration]) -> Cloud:
 
 
 def _together(scan: Cloud, placed: Cloud) -> Cloud:
-    """Put the scan and the part into one cloud, each in its color."""
+    """Put the scan and what lies in it into one cloud, each in its color."""
     colors = np.repeat(np.array(_COLORS, np.uint8), [len(scan), len(placed)], axis=0)
     names = dict(zip(("red", "green", "blue"), colors.T, strict=True))
     return Cloud(np.concatenate([scan.xyz, placed.xyz]), names, viewpoint=scan.viewpoint)

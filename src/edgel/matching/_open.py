@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from edgel.matching._prepare import shared_planes
 from edgel.matching._refine import middle_of, radius_of
 from edgel.matching._search import Match
 from edgel.matching._verify import confirm, scores_of
 
 _WEAK = 0.1  # of the mean information of a direction in which every plane would count: stronger ones are not asked
 _MOVED = 3.0  # tolerances by which a pose is moved to see whether that is noticed
+_FLOOR = 0.02  # spacings: no distance is known better
 _UNNOTICED = 0.78  # of the score that is left where next to nothing notices: the ends of what was seen may, by chance
 
 
@@ -39,13 +41,6 @@ def moved_by(match: Match, pose: np.ndarray, twist: np.ndarray) -> np.ndarray:
     return moved
 
 
-def twist_between(match: Match, pose: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Return the twist (6,) by which `moved_by` takes one pose to another."""
-    middle = middle_of(match.whole)
-    shift = (other - pose) @ np.append(middle, 1)
-    return np.concatenate([radius_of(match.whole) * vector_of(other[:3, :3] @ pose[:3, :3].T), shift[:3]])
-
-
 def rotation_of(vector: np.ndarray) -> np.ndarray:
     """Return the rotation (3, 3) of a rotation vector (Rodrigues)."""
     angle = float(np.linalg.norm(vector))
@@ -69,7 +64,12 @@ def vector_of(rotation: np.ndarray) -> np.ndarray:
     return np.pi * axis / np.linalg.norm(axis)
 
 
-def covariance_of(information: np.ndarray, variance: float, free: np.ndarray) -> np.ndarray:
-    """Return the covariance (6, 6) of what is not free."""
+def covariance_of(match: Match, information: np.ndarray, residuals: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """Return the covariance (6, 6) of what is not free, turns as arcs; see `refine` for what the arguments are."""
+    weights, squares = np.maximum(residuals[::2], 1e-9), residuals[1::2]
+    variances = np.maximum(squares / weights, (_FLOOR * match.spacing) ** 2)
+    # Planes that share points err alike.
+    variances[0] *= max(shared_planes(match.source), shared_planes(match.target))
     fixed = np.eye(6) - free.T @ free
-    return variance * np.linalg.pinv(fixed @ information @ fixed, rcond=1e-10, hermitian=True)
+    told = (information / variances[:, None, None]).sum(axis=0)
+    return np.linalg.pinv(fixed @ told @ fixed, rcond=1e-10, hermitian=True)

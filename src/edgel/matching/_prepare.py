@@ -100,6 +100,11 @@ def prepare(points: Any, edges: Edges | None, name: str) -> Prepared:
     return Prepared(half, places[clear], normals[clear], smooth, gap, spacing, size, sight, cloud.viewpoint is not None)
 
 
+def shared_planes(side: Prepared) -> float:
+    """Return how many of the planes of a surface each point of a cloud belongs to, 1 at least; 1 of a model."""
+    return max(_PLANE * (side.spacing / side.gap) ** 2, 1.0)
+
+
 def away_from(places: np.ndarray, edges: np.ndarray, reach: float) -> np.ndarray:
     """Return the distance (S,) of places (S, 3) from the nearest edge, at most the reach."""
     edges = edges[np.isfinite(edges).all(axis=1)]

@@ -32,11 +32,11 @@ def _add(matrix, right, normal, offset, away, radius, weight):
 
 
 @kernel
-def _equations(pose, probes, field, centre, radius, reach, light, matrix, right):
-    """Write the normal equations of one step; returns the weight and the weighted square sum of the plane residuals."""
-    matrix[:], right[:] = 0.0, 0.0
-    edges, edges_right, offset = np.zeros((6, 6)), np.zeros(6), np.empty(3)
-    edge_weight, weight, squares = 0.0, 0.0, 0.0
+def _equations(pose, probes, field, centre, radius, reach, light, information, sums, matrix, right):
+    """Write the normal equations of one step, and what planes and edges tell and weigh, each by themselves."""
+    planes, edges = information[0], information[1]
+    planes[:], edges[:], right[:], sums[:] = 0.0, 0.0, 0.0, 0.0
+    edges_right, offset = np.zeros(6), np.empty(3)
     for e in range(len(probes.weights)):
         x, y, z = move(pose, probes.places[e])
         _, found = find_edge(field, pose, x, y, z, probes.frames[e], probes.turn[e], probes.bend[e], reach)
@@ -50,7 +50,8 @@ def _equations(pose, probes, field, centre, radius, reach, light, matrix, right)
             away += (z - field.places[found, 2]) * normal[2]
             w = 1.0 / (1.0 + (away / (_ROBUST * reach)) ** 2) ** 2
             _add(edges, edges_right, normal, offset, away, radius, w)
-            edge_weight += w
+            sums[2] += w
+            sums[3] += w * away * away
     for s in range(len(probes.surface_weights)):
         x, y, z = move(pose, probes.surface[s])
         n0, n1, n2 = turned_by(pose, probes.normals[s])
@@ -59,17 +60,16 @@ def _equations(pose, probes, field, centre, radius, reach, light, matrix, right)
             continue
         offset[0], offset[1], offset[2] = x - centre[0], y - centre[1], z - centre[2]
         w = 1.0 / (1.0 + (away / (_ROBUST * reach)) ** 2) ** 2
-        _add(matrix, right, field.normals[found], offset, away, radius, w)
-        weight += w
-        squares += w * away * away
-    share = min(1.0, _LIGHT / max(edge_weight, 1e-9)) if light else 1.0
-    total = weight + share * edge_weight
+        _add(planes, right, field.normals[found], offset, away, radius, w)
+        sums[0] += w
+        sums[1] += w * away * away
+    share = min(1.0, _LIGHT / max(sums[2], 1e-9)) if light else 1.0
     for i in range(6):
         right[i] += share * edges_right[i]
         for j in range(i + 1):
-            matrix[i, j] += share * edges[i, j]
-        matrix[i, i] += _DAMPING * total
-    return weight, squares
+            edges[i, j] *= share
+            matrix[i, j] = planes[i, j] + edges[i, j]
+        matrix[i, i] += _DAMPING * (sums[0] + share * sums[2])
 
 
 @kernel
@@ -101,9 +101,8 @@ def _refine(start, stop, poses, probes, field, middle, radius, reaches, steps, i
         for step in range(steps[0] + steps[1]):
             light = step >= steps[0]
             centre[0], centre[1], centre[2] = move(pose, middle)
-            weight, squares = _equations(pose, probes, field, centre, radius, reach, light, matrix, right)
-            information[p] = matrix
-            residuals[p, 0], residuals[p, 1] = weight, squares
+            told, sums = information[p], residuals[p]
+            _equations(pose, probes, field, centre, radius, reach, light, told, sums, matrix, right)
             factorize(matrix, lower, inverse)
             explain(inverse, right, along)
             solve(inverse, along, solution)
@@ -135,19 +134,19 @@ def refine(
     -------
     (P, 4, 4) float64
         The poses.
-    (P, 6, 6) float64
-        Their information: of the turn about the moved middle of the probes (rotation vector times `radius_of`), then of
-        the shift, per unit variance of a distance.
-    (P, 2) float64
-        Weight of the plane residuals, and the weighted sum of their squares.
+    (P, 2, 6, 6) float64
+        What planes tell of them, and edges, as one weighs them: of the turn about the moved middle of the probes
+        (rotation vector times `radius_of`), then of the shift, per unit variance of a distance.
+    (P, 4) float64
+        Weight of the planes' residuals, the weighted sum of their squares, and the same of the edges.
     """
-    moved, information = np.array(poses, np.float64), np.zeros((len(poses), 6, 6))
-    residuals = np.zeros((len(poses), 2))
+    moved, information = np.array(poses, np.float64), np.zeros((len(poses), 2, 6, 6))
+    residuals = np.zeros((len(poses), 4))
     middle, radius = middle_of(probes), radius_of(probes)
     reach, whole = np.array(reaches, np.float64), np.array(steps, np.int64)
     run_slices(_refine, len(moved), moved, probes, field, middle, radius, reach, whole, information, residuals, size=1)
     lower = np.tril(information)
-    return moved, lower + np.tril(information, -1).transpose(0, 2, 1), residuals
+    return moved, lower + np.tril(information, -1).transpose(0, 1, 3, 2), residuals
 
 
 def middle_of(probes: Probes) -> np.ndarray:

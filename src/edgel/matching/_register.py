@@ -25,7 +25,6 @@ _FEWEST_PLACES = 30
 _FEW_EDGES = 24  # half-edges of a search, with fewer of which the surface proposes poses
 _PLANE = 0.95  # cosine of normals that look the same way, and their share
 _END = 1.5  # spacings
-_FLOOR = 0.02  # spacings: no distance is known better
 
 
 def register(
@@ -144,9 +143,8 @@ def _answer(
     """Say what was found, in the frames of the source and the target that were asked for."""
     (pose, *_), score = found.poses, float(found.scores[0])
     _, information, residuals = match.refined(pose[None], end)
-    (weight, squares), information = residuals[0], information[0]
-    free = free_directions_of(match, pose, information, weight)
-    same, group = same_answers(match, found, free, swapped, symmetries)
+    free = free_directions_of(match, pose, information[0].sum(axis=0), residuals[0, 0])
+    same, group = same_answers(match, found, swapped, symmetries)
     others = found.scores[~same]
     margin = 1.0 if not len(others) else float(np.clip((score - others[0]) / max(score, 1e-9), 0, 1))
     turned = found.poses if not swapped else np.linalg.inv(found.poses)
@@ -155,8 +153,7 @@ def _answer(
     if doubt:
         return not_found(doubt, stages.seconds, Poses(turned, found.scores))
     scale = np.append(np.full(3, 1 / radius_of(match.whole)), np.ones(3))
-    variance = max(squares / max(weight, 1e-9), (_FLOOR * match.spacing) ** 2)
-    covariance = covariance_of(information, variance, free) * np.outer(scale, scale)
+    covariance = covariance_of(match, information[0], residuals[0], free) * np.outer(scale, scale)
     center = pose[:3, :3] @ middle_of(match.whole) + pose[:3, 3]
     free = free * scale
     if swapped:  # a small move of the target in the source, seen from the target, is the opposite move
@@ -170,8 +167,8 @@ def _answer(
         score=score,
         fitness=_fitness(found),
         edge_fitness=float(found.columns[0, :, EDGE].max()),
-        rmse=float(np.sqrt(squares / max(weight, 1e-9))),
-        margin=margin,
+        rmse=float(np.sqrt(residuals[0, 1] / max(residuals[0, 0], 1e-9))),
+        margin=margin if method != "initial" else float("nan"),
         alternatives=alternatives,
         symmetries=group,
         free_directions=free,

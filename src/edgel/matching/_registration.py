@@ -51,7 +51,8 @@ class Registration:
         cloud's unit.
     margin : float
         How far the best pose is ahead of the next that is no other name for it: 0 they are as good, 1 there is no
-        other. Poses that differ by a symmetry are one.
+        other; NaN where no other was looked for. Poses that differ by a symmetry are one, those along a free direction
+        are not.
     alternatives : Poses
         The other poses that were verified.
     symmetries : (S, 4, 4) float64

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from edgel.matching._open import rotation_of, twist_between, vector_of
+from edgel.matching._open import rotation_of, vector_of
 from edgel.matching._prepare import Prepared
 from edgel.matching._search import Found, Match, distances, distinct_rows, search
 from edgel.matching._verify import EDGE, SURFACE, confirm
@@ -37,17 +37,15 @@ def symmetries_of(part: Prepared) -> np.ndarray:
 
 
 def same_answers(
-    match: Match, found: Found, free: np.ndarray, swapped: bool, symmetries: np.ndarray | None
+    match: Match, found: Found, swapped: bool, symmetries: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Tell which poses come to the same as the first: by what is free, or by a symmetry.
+    """Tell which poses come to the same as the first, or are that by a symmetry.
 
     Parameters
     ----------
     match : Match
     found : Found
         (P) poses.
-    free : (F, 6) float64
-        See `edgel.matching._open.free_directions_of`.
     swapped : bool
         Whether the match looks for the target in the source.
     symmetries : (S, 4, 4) float64 or None
@@ -60,9 +58,6 @@ def same_answers(
     """
     best = found.poses[0]
     same = distances(found.poses, best, match.whole) <= match.same
-    for p in np.flatnonzero(~same) if len(free) else ():
-        twist = twist_between(match, best, found.poses[p])
-        same[p] = np.linalg.norm(twist - free.T @ (free @ twist)) <= match.same
     group = np.eye(4)[None]
     if symmetries is not None:
         names = symmetries @ best if swapped else best @ symmetries
