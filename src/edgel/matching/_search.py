@@ -17,7 +17,7 @@ PARTS = 28  # of the smaller cloud's size: how far apart half-edges are that pro
 _APART = 8.0  # spacings, at most
 _SOURCES, _TARGETS, _VOTERS, _SURFACE = 300, 2400, 64, 250
 _PAIRS = 250_000  # that are tried, by fewer of the source where the target has many
-_MOST = 3000  # half-edges that refine
+_MOST = 2000  # half-edges, and places of the surface, that refine
 _PROPOSED, _REFINED, _FINAL = 1500, 80, 12
 _REACH, _TIGHT, _END = 4.0, 2.0, 1.5  # spacings: matches at first, of a verification, and in the end
 
@@ -85,7 +85,7 @@ class Match:
         spacing = max(source.spacing, target.spacing, least)
         apart = _apart(source, target, spacing)
         few = _probes(source.half.thinned(apart, _SOURCES), source, _SURFACE)
-        whole = _probes(source.half.thinned(spacing / 2, _MOST), source, len(source.surface))
+        whole = _probes(source.half.thinned(spacing / 2, _MOST), source, _MOST)
         return Match(source, target, spacing, apart, few, whole, _field(target, target.half, _REACH * spacing))
 
     def coarse(self) -> Field:
@@ -132,7 +132,8 @@ def search(match: Match, end: float, most: int = _FINAL, *, by_surface: bool = F
     else:
         chosen = _some(few, max(_PAIRS // max(len(coarse.turn), 1), _VOTERS))
         poses = propose(chosen, _some(few, _VOTERS), coarse, match.apart, _PROPOSED)
-    scores = scores_of(confirm(poses, few, coarse, match.apart))
+    rough = Probes(*_some(few, 2 * _VOTERS)[:5], *(column[::2] for column in few[5:]))
+    scores = scores_of(confirm(poses, rough, coarse, match.apart))
     poses = _best(poses, scores, few, 2 * match.apart, max(_REFINED, 2 * most))
     poses, _, _ = refine(poses, few, coarse, (1.5 * match.apart, _REACH * spacing), (5, 0))
     poses, _, _ = refine(poses, few, match.fine, (_REACH * spacing, _TIGHT * spacing), (6, 0))
@@ -168,19 +169,24 @@ def _best(poses: np.ndarray, scores: np.ndarray, probes: Probes, shift: float, m
 
 def distinct_rows(poses: np.ndarray, probes: Probes, shift: float, most: int | None = None) -> np.ndarray:
     """Rows of poses, at most so many, each of which lies by more than a shift from all before (`distances`)."""
-    kept: list[int] = []
+    places, kept = _placed(poses, probes), np.empty(0, np.int64)
     for p in range(len(poses)):
         if len(kept) == most:
             break
-        if not kept or (distances(poses[kept], poses[p], probes) > shift).all():
-            kept.append(p)
-    return np.array(kept, np.int64)
+        if not len(kept) or (((places[kept] - places[p]) ** 2).sum(axis=1) > shift**2).all():
+            kept = np.append(kept, p)
+    return kept
 
 
 def distances(poses: np.ndarray, other: np.ndarray, probes: Probes) -> np.ndarray:
     """How far poses (P, 4, 4) move the surface from where another one does, (P,): root mean square."""
+    return np.sqrt(((_placed(poses, probes) - _placed(other[None], probes)) ** 2).sum(axis=1))
+
+
+def _placed(poses: np.ndarray, probes: Probes) -> np.ndarray:
+    """Place poses in a space (P, 12) in which they are as far apart as they move the surface, root mean square."""
     middle = middle_of(probes)
-    spread = np.cov((probes.surface - middle).T, bias=True)
-    turn = poses[:, :3, :3] - other[:3, :3]
-    off = turn @ middle + poses[:, :3, 3] - other[:3, 3]
-    return np.sqrt(np.einsum("pij,jk,pik->p", turn, spread, turn) + (off**2).sum(axis=1))
+    values, vectors = np.linalg.eigh(np.cov((probes.surface - middle).T, bias=True))
+    axes = vectors * np.sqrt(np.maximum(values, 0))
+    turned = (poses[:, :3, :3] @ axes).reshape(-1, 9)
+    return np.concatenate([turned, poses[:, :3, :3] @ middle + poses[:, :3, 3]], axis=1)
