@@ -174,7 +174,7 @@ def _moved(cloud: Cloud, found: list[Registration]) -> Cloud:
 def _together(scan: Cloud, placed: Cloud) -> Cloud:
     """Put the scan and what lies in it into one cloud, each in its color."""
     colors = np.repeat(np.array(_COLORS, np.uint8), [len(scan), len(placed)], axis=0)
-    names = dict(zip(("red", "green", "blue"), colors.T, strict=True))
+    names: dict[str, Any] = dict(zip(("red", "green", "blue"), colors.T, strict=True))
     return Cloud(np.concatenate([scan.xyz, placed.xyz]), names, viewpoint=scan.viewpoint)
 
 

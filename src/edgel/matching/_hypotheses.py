@@ -71,4 +71,5 @@ def _alike(source: Probes, field: Field) -> tuple[np.ndarray, np.ndarray]:
     bend, other_bend = source.bend[:, None], field.bend[None]
     creases = (turn >= 0) & (other >= 0)
     same = (np.abs(turn - other) < TURN) & (bend * other_bend >= 0)
-    return np.nonzero(np.where(creases, same, (bend >= 0) & (other_bend >= 0)))
+    i, j = np.nonzero(np.where(creases, same, (bend >= 0) & (other_bend >= 0)))
+    return i, j

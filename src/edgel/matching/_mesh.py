@@ -16,7 +16,6 @@ FILES = (*MESHES, *STEPS)
 CREASE = np.radians(25.0)
 """Least turn of a crease: facets of a round surface turn by less."""
 _WELD = 1e-6  # of the size: corners nearer than this are one
-_CHORD = 1e-3  # of the size, by which facets of a STEP file's faces may lie off them
 _STEPS = 250  # along the size, between half-edges on an edge
 _DARTS = 8  # places drawn for each that is kept
 _GOLDEN = np.array([0.8191725134, 0.6710436067, 0.5497004779])  # shares of Roberts' low-discrepancy sequence
@@ -32,7 +31,9 @@ def read_part(path: str | os.PathLike[str]) -> tuple[np.ndarray, np.ndarray]:
     """
     name, kind = os.fspath(path), Path(path).suffix.lower()
     if kind in STEPS:
-        return _read_step(name)
+        from edgel.matching._step import read_step
+
+        return read_step(name)
     if kind not in MESHES:
         raise FormatError(f"{name}: a part is a mesh ({', '.join(MESHES)}) or STEP ({', '.join(STEPS)})")
     from edgel.io.mesh import load
@@ -63,54 +64,6 @@ def triangles_of(vertices: Any, faces: Any) -> tuple[np.ndarray, np.ndarray]:
         raise ValueError("mesh: no triangle has an area; mend the mesh")
     kept = length > 0
     return corners[kept], np.repeat((normals[kept] / length[kept, None])[:, None], 3, axis=1)
-
-
-def _read_step(name: str) -> tuple[np.ndarray, np.ndarray]:
-    if not os.path.isfile(name):
-        raise FormatError(f"{name}: no such file")
-    try:
-        import build123d as cad
-        from OCP.BRep import BRep_Tool
-        from OCP.BRepMesh import BRepMesh_IncrementalMesh
-        from OCP.GeomLProp import GeomLProp_SLProps
-        from OCP.TopAbs import TopAbs_REVERSED
-        from OCP.TopLoc import TopLoc_Location
-    except ImportError as error:
-        raise FormatError(f"{name}: STEP needs build123d; install it with `pip install edgel[step]`") from error
-    try:
-        shape = cad.import_step(name)
-        faces = shape.faces()
-        size = shape.bounding_box().diagonal
-    except Exception as error:  # the kernel raises whatever a damaged file leads it to
-        raise FormatError(f"{name}: no STEP file that build123d reads ({error}); export it again") from None
-    if not len(faces):
-        raise FormatError(f"{name}: holds no surface; export the part as a solid")
-    BRepMesh_IncrementalMesh(shape.wrapped, _CHORD * size, False, 0.2, False)
-    corners, normals = [], []
-    for face in faces:
-        place = TopLoc_Location()
-        mesh, surface = BRep_Tool.Triangulation_s(face.wrapped, place), BRep_Tool.Surface_s(face.wrapped)
-        if mesh is None:
-            continue
-        turned = face.wrapped.Orientation() == TopAbs_REVERSED
-        places, outward = [], []
-        for i in range(1, mesh.NbNodes() + 1):
-            at, uv = mesh.Node(i).Transformed(place.Transformation()), mesh.UVNode(i)
-            local = GeomLProp_SLProps(surface, uv.X(), uv.Y(), 1, 1e-9)
-            n = local.Normal() if local.IsNormalDefined() else None
-            places.append((at.X(), at.Y(), at.Z()))
-            outward.append((n.X(), n.Y(), n.Z()) if n else (np.nan,) * 3)
-        rows = np.array([mesh.Triangle(i).Get() for i in range(1, mesh.NbTriangles() + 1)], int).reshape(-1, 3) - 1
-        rows = rows[:, ::-1] if turned else rows
-        triangles, flat = triangles_of(np.array(places), rows)
-        exact = np.array(outward)[rows] * (-1 if turned else 1)
-        area = np.linalg.norm(
-            np.cross(*(np.array(places)[rows][:, k] - np.array(places)[rows][:, 0] for k in (1, 2))), axis=1
-        )
-        exact = exact[area > 0]
-        corners.append(triangles)
-        normals.append(np.where(np.isfinite(exact), exact, flat))
-    return np.concatenate(corners), np.concatenate(normals)
 
 
 def creases_of(corners: np.ndarray, normals: np.ndarray) -> HalfEdges:

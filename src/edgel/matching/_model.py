@@ -142,8 +142,9 @@ class Model:
 def _parts_of(part: Any) -> tuple[Any, Any]:
     if isinstance(part, tuple | list) and len(part) == 2:
         return part[0], part[1]
-    if hasattr(part, "vertices") and hasattr(part, "faces"):
-        return part.vertices, part.faces
+    vertices, faces = getattr(part, "vertices", None), getattr(part, "faces", None)
+    if vertices is not None and faces is not None:
+        return vertices, faces
     raise TypeError(f"part: expected a file, (vertices, triangles) or a mesh, got {type(part).__name__}")
 
 

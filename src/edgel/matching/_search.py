@@ -132,7 +132,8 @@ def search(match: Match, end: float, most: int = _FINAL, *, by_surface: bool = F
     else:
         chosen = _some(few, max(_PAIRS // max(len(coarse.turn), 1), _VOTERS))
         poses = propose(chosen, _some(few, _VOTERS), coarse, match.apart, _PROPOSED)
-    rough = Probes(*_some(few, 2 * _VOTERS)[:5], *(column[::2] for column in few[5:]))
+    surface, normals, shares = (column[::2] for column in few[5:])
+    rough = _some(few, 2 * _VOTERS)._replace(surface=surface, normals=normals, surface_weights=shares)
     scores = scores_of(confirm(poses, rough, coarse, match.apart))
     poses = _best(poses, scores, few, 2 * match.apart, max(_REFINED, 2 * most))
     poses, _, _ = refine(poses, few, coarse, (1.5 * match.apart, _REACH * spacing), (5, 0))
@@ -158,7 +159,8 @@ def _field(side: Prepared, half: HalfEdges, reach: float) -> Field:
 def _some(probes: Probes, most: int) -> Probes:
     """Choose at most so many of the half-edges, all over the part, in no order."""
     rows = np.random.default_rng(0).permutation(len(probes.weights))[:most]
-    return Probes(*(column[rows] for column in probes[:5]), *probes[5:])
+    places, frames, turn, bend, weights = (column[rows] for column in probes[:5])
+    return probes._replace(places=places, frames=frames, turn=turn, bend=bend, weights=weights)
 
 
 def _best(poses: np.ndarray, scores: np.ndarray, probes: Probes, shift: float, most: int) -> np.ndarray:
