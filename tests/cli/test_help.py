@@ -82,7 +82,8 @@ def folder(tmp_path_factory):
 SHOWN = [line for command in COMMANDS for line in examples(run(command, "--help").stdout)]
 if (ROOT / "README.md").is_file():
     SHOWN += re.findall(r"^\| `(edgel .+?)` \|", (ROOT / "README.md").read_text(), re.MULTILINE)
-LONG = ("edgel view", "edgel demo")  # they wait for someone, or take half a minute; each has tests of its own
+# They wait for someone, take half a minute, or want a scan of a part; each has tests of its own.
+LONG = ("edgel view", "edgel demo", "edgel match")
 TRIED = [line for line in dict.fromkeys(SHOWN) if not line.startswith(LONG)]
 
 

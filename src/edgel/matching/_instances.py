@@ -8,9 +8,9 @@ import numpy as np
 
 from edgel._kernels.parallel import kernel, run_slices
 from edgel._stages import Stages
+from edgel.matching._answer import register_prepared
 from edgel.matching._grid import find_cell
 from edgel.matching._prepare import Prepared
-from edgel.matching._register import register_prepared
 from edgel.matching._registration import Registration
 from edgel.matching._search import Match
 

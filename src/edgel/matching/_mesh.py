@@ -1,45 +1,19 @@
-"""Meshes and STEP files as parts: exact creases, and places evenly over the surface."""
+"""Meshes as parts: exact creases, and places evenly over the surface."""
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from edgel.io import FormatError
 from edgel.matching._half_edges import HalfEdges, frames_of, join, of_creases
 
-MESHES, STEPS = (".stl", ".ply", ".obj", ".off"), (".step", ".stp")
-FILES = (*MESHES, *STEPS)
 CREASE = np.radians(25.0)
 """Least turn of a crease: facets of a round surface turn by less."""
 _WELD = 1e-6  # of the size: corners nearer than this are one
 _STEPS = 250  # along the size, between half-edges on an edge
 _DARTS = 8  # places drawn for each that is kept
 _GOLDEN = np.array([0.8191725134, 0.6710436067, 0.5497004779])  # shares of Roberts' low-discrepancy sequence
-
-
-def read_part(path: str | os.PathLike[str]) -> tuple[np.ndarray, np.ndarray]:
-    """Read the triangles of a part and the normals of its surface at their corners, both (T, 3, 3).
-
-    Raises
-    ------
-    FormatError
-        If the file is none of a mesh or STEP, is damaged, or what reads it is not installed.
-    """
-    name, kind = os.fspath(path), Path(path).suffix.lower()
-    if kind in STEPS:
-        from edgel.matching._step import read_step
-
-        return read_step(name)
-    if kind not in MESHES:
-        raise FormatError(f"{name}: a part is a mesh ({', '.join(MESHES)}) or STEP ({', '.join(STEPS)})")
-    from edgel.io.mesh import load
-
-    mesh = load(path)
-    return triangles_of(mesh.vertices, mesh.faces)
 
 
 def triangles_of(vertices: Any, faces: Any) -> tuple[np.ndarray, np.ndarray]:

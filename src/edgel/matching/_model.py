@@ -13,10 +13,13 @@ from edgel._neighbors.thinning import thin_to
 from edgel._stages import Stages
 from edgel.cloud import Cloud
 from edgel.edges import Edges
-from edgel.matching._mesh import creases_of, read_part, spread_over, triangles_of
+from edgel.matching._files import read_part
+from edgel.matching._instances import find_instances
+from edgel.matching._mesh import creases_of, spread_over, triangles_of
 from edgel.matching._prepare import MOST_SURFACE, Prepared, away_from, prepare
 from edgel.matching._registration import Registration
 from edgel.matching._sight import no_sight
+from edgel.matching._symmetry import symmetries_of
 
 _SMOOTH = 0.03  # of the size from any edge, from where on the surface is smooth
 
@@ -88,8 +91,6 @@ class Model:
     @cached_property
     def symmetries(self) -> np.ndarray:
         """Moves (S, 4, 4) that leave the part as it is, the identity first; any turn about an axis as 72 of them."""
-        from edgel.matching._symmetry import symmetries_of
-
         return self._symmetries if self._symmetries is not None else symmetries_of(self.prepared)
 
     def to_cloud(self) -> Cloud:
@@ -129,8 +130,6 @@ class Model:
         TypeError, ValueError
             See `edgel.register`.
         """
-        from edgel.matching._instances import find_instances
-
         if most < 1:
             raise ValueError(f"most: expected a number of instances of at least 1, got {most}")
         stages = Stages()

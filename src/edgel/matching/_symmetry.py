@@ -7,12 +7,14 @@ import numpy as np
 from edgel.matching._open import rotation_of, vector_of
 from edgel.matching._prepare import Prepared
 from edgel.matching._search import Found, Match, distances, distinct_rows, search
-from edgel.matching._verify import EDGE, SURFACE, confirm
+from edgel.matching._verify import EDGE, MISSING, SURFACE, confirm
 
 TURNS = 72
 """Turns that stand for any about an axis."""
 _FINE = 150.0  # of the size: spacing at which a part is matched with itself
-_SURFACE, _EDGES = 0.93, 0.85  # of the shares that the part itself has, which a symmetry leaves
+_EXACT, _SCANNED = (0.97, 0.93, 0.01), (0.9, 0.7, 0.03)
+"""Least shares of surface and edges that a symmetry leaves in place, over those that no move leaves, and most share of
+the creases that it takes to where the surface is smooth; of a model and of a scan."""
 _MOST = 60  # symmetries that are looked for
 _ROUND = 30  # and from how many on it is any turn about an axis
 _TRIED = 1000  # products of symmetries that are tried at a time
@@ -79,9 +81,11 @@ def same_answers(
 
 def _leave(match: Match, moves: np.ndarray) -> np.ndarray:
     """Tell which moves (S, 4, 4) leave the source of a match, whose target it is too, as it is."""
+    surfaces, edges, missing = _EXACT if match.source.spacing == 0 else _SCANNED
     columns = confirm(np.concatenate([np.eye(4)[None], moves]), match.few, match.fine, match.tight)
-    surface, edge = columns[:, SURFACE], columns[:, EDGE]
-    return (surface[1:] >= _SURFACE * surface[0]) & (edge[1:] >= _EDGES * edge[0])
+    still, columns = columns[0], columns[1:]
+    kept = (columns[:, SURFACE] >= surfaces * still[SURFACE]) & (columns[:, EDGE] >= edges * still[EDGE])
+    return kept & (columns[:, MISSING] <= still[MISSING] + missing)
 
 
 def _turns(moves: np.ndarray, middle: np.ndarray) -> np.ndarray:
