@@ -49,7 +49,8 @@ def ransac(source: Cloud, target: Cloud, h: float, voxel: float) -> np.ndarray:
 
 def fgr(source: Cloud, target: Cloud, h: float, voxel: float) -> np.ndarray:
     (a, fa), (b, fb) = cloud_of(source, voxel * h), cloud_of(target, voxel * h)
-    option = _REG.FastGlobalRegistrationOption(maximum_correspondence_distance=0.5 * voxel * h, seed=0)
+    o3d.utility.random.seed(0)
+    option = _REG.FastGlobalRegistrationOption(maximum_correspondence_distance=0.5 * voxel * h)
     found = _REG.registration_fgr_based_on_feature_matching(a, b, fa, fb, option)
     return icp(source, target, h, found.transformation)
 

@@ -15,6 +15,9 @@ MIN_TURN = np.radians(18.0)
 MIN_FACING = 0.25
 """Least cosine to the line of sight: where the surface turns away from a sensor its outline moves with the sensor."""
 _ALIKE = 0.97  # cosine between frames that count as the same direction
+_INSIDE = (
+    0.25  # spacings by which a view's outlines lie inside the end of the surface: measured, .15 to .33 on five parts
+)
 _BESIDE = 4.0  # spacings within which the surface lies beside an outline
 _FRAME_STEPS = 1.2  # cells of a frame's vectors, in which half-edges at one place are told apart
 
@@ -148,7 +151,8 @@ def of_edges(
         facing = np.ones(len(rim)) if eye is None else _facing(rim.position, normal, eye)
         kept = (np.abs(beside) > 0.2 * spacing) & (facing > MIN_FACING)
         frames = frames_of(into[kept] * np.sign(beside[kept])[:, None], normal[kept])
-        found.append(HalfEdges(rim.position[kept], frames, np.full(kept.sum(), np.nan), np.ones(kept.sum(), np.int64)))
+        places = rim.position[kept] - (0.0 if eye is None else _INSIDE * spacing) * frames[:, 0]
+        found.append(HalfEdges(places, frames, np.full(kept.sum(), np.nan), np.ones(kept.sum(), np.int64)))
     return join(found)
 
 
