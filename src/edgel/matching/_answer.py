@@ -15,7 +15,7 @@ from edgel.matching._verify import EDGE, SURFACE, VISIBLE
 
 SURE = 0.1
 """Margin from which on an answer can be relied on: `docs/matching.md` says how often such answers are right."""
-_LEAST_SCORE, _LEAST_FIT = 0.1, 0.5  # parts that share nothing reach .19 and .5, rarely both
+_LEAST_SCORE, _LEAST_FIT = 0.1, 0.5  # parts that share nothing reach .19 and .47
 _ORDERS = 15.0  # spacings of either cloud that the other has to be large
 _FEWEST_PLACES = 30
 _FEW_EDGES = 24  # half-edges of a search, with fewer of which the surface proposes poses
