@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
+import first_run
 import growth
 import promises
 import real_sensors
@@ -157,6 +158,9 @@ def _speed(results: dict[str, Any]) -> Iterator[str]:
         yield tables.frame_times(results["frames"])
     if results.get("memory"):
         yield tables.memory(results["memory"])
+    if results.get("first_run"):
+        yield "The first run, with an empty cache of kernels, and small clouds: medians of five, CPU of all processes."
+        yield first_run.table(results["first_run"])
     yield "Stages of both methods at 647,984 points."
     lines = [[s["method"], s["stage"], f"{s['seconds']:.4f}"] for s in results["stages"]]
     yield tables.table(["method", "stage", "s"], lines)

@@ -8,8 +8,10 @@ if TYPE_CHECKING:
     from edgel._depth import from_depth
     from edgel._detect import detect
     from edgel._intrinsics import Intrinsics
+    from edgel._many import Detections, detect_many
     from edgel._neighbors.estimate import estimate_normals
     from edgel._neighbors.normals import Normals
+    from edgel._probabilities import probabilities
     from edgel.cloud import Cloud
     from edgel.edges import EdgeKind, Edges
     from edgel.io import FormatError, FormatWarning, read, write
@@ -19,6 +21,7 @@ __version__ = "0.1.0.dev0"
 
 __all__ = [
     "Cloud",
+    "Detections",
     "EdgeKind",
     "Edges",
     "FormatError",
@@ -29,10 +32,12 @@ __all__ = [
     "Registration",
     "curves",
     "detect",
+    "detect_many",
     "estimate_normals",
     "from_depth",
     "matching",
     "paper",
+    "probabilities",
     "read",
     "register",
     "write",
@@ -42,6 +47,7 @@ __all__ = [
 # line already has to answer Ctrl-C.
 _HOMES = {
     "Cloud": "edgel.cloud",
+    "Detections": "edgel._many",
     "EdgeKind": "edgel.edges",
     "Edges": "edgel.edges",
     "FormatError": "edgel.io",
@@ -51,8 +57,10 @@ _HOMES = {
     "Normals": "edgel._neighbors.normals",
     "Registration": "edgel.matching",
     "detect": "edgel._detect",
+    "detect_many": "edgel._many",
     "estimate_normals": "edgel._neighbors.estimate",
     "from_depth": "edgel._depth",
+    "probabilities": "edgel._probabilities",
     "read": "edgel.io",
     "register": "edgel.matching",
     "write": "edgel.io",

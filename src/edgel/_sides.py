@@ -8,7 +8,7 @@ import numpy as np
 
 from edgel._faces import Faces
 from edgel._kernels.parallel import kernel
-from edgel._neighbors.kdtree import bounds
+from edgel._neighbors.kdtree import NeighborIndex, bounds
 from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.normals import SENSOR, UNKNOWN
 from edgel._neighbors.orientation import outward_normals
@@ -52,11 +52,17 @@ def orient_faces(
         return faces
     if orientation == UNKNOWN:
         return replace(faces, convex=np.zeros_like(faces.convex))
-    index, votes, pooled = surface.index, np.zeros(len(edge)), np.zeros(len(edge))
+    index = surface.index
     normals = outward_normals(index) if own is None else own
+    return turn_faces(faces, index, edge, sure, normals[index.order])
+
+
+def turn_faces(faces: Faces, index: NeighborIndex, edge: np.ndarray, sure: np.ndarray, normals: np.ndarray) -> Faces:
+    """Turn the faces at edge points (E,), ascending, by the normals (N, 3) by place: see `orient_faces`."""
+    votes, pooled = np.zeros(len(edge)), np.zeros(len(edge))
     queries, row = at_points(index, edge), np.full(len(index), -1)
     row[edge[sure]] = np.flatnonzero(sure)
-    arguments = (faces.position, faces.normals, normals[index.order], votes)
+    arguments = (faces.position, faces.normals, normals, votes)
     visit_neighbors(_ask, queries, index, min(AROUND, len(index)), *arguments)
     bends = faces.convex * votes
     arguments = (faces.normals, row[index.order], bends, pooled)

@@ -46,7 +46,10 @@ def as_html(edges: Edges) -> str:
 
 def draw(edges: Edges, axes: Any, points: Any) -> Any:
     """Scatter edges in Matplotlib axes; see `Edges.plot`."""
-    from matplotlib import pyplot
+    try:
+        from matplotlib import pyplot
+    except ImportError as error:
+        raise ImportError("plot() needs Matplotlib: pip install 'edgel[plot]', or pip install matplotlib") from error
 
     axes = pyplot.figure().add_subplot(projection="3d") if axes is None else axes
     count = 3 if hasattr(axes, "get_zlim") else 2

@@ -18,7 +18,7 @@ import edgel
 from edgel import io
 from edgel._cli import app
 
-COMMANDS = ("detect", "view", "normals", "info", "convert", "render", "lines", "match", "demo")
+COMMANDS = ("detect", "view", "normals", "info", "convert", "render", "lines", "match", "demo", "warmup")
 ROOT = Path(__file__).parents[2]
 FACE = "facet normal 0 0 0\nouter loop\nvertex {}\nvertex {}\nvertex {}\nendloop\nendfacet\n"
 CORNER = FACE.format("0 0 0", "1 0 0", "0 1 0") + FACE.format("0 0 0", "0 1 0", "0 0 1")

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from alone import alone
 from hypothesis import given
 from hypothesis import strategies as st
 from test_knn import cloud
 
 from edgel._neighbors.kdtree import BUCKET, bounds, build_index, node_start
-from edgel._neighbors.selection import sort_places, value_at
+from edgel._neighbors.selection import quantile, sort_places, value_at
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -17,14 +18,14 @@ def test_the_value_at_a_rank_is_that_of_the_sorted_keys(seed, count, values):
     rng = np.random.default_rng(seed)
     keys = rng.integers(0, values, count + 5) / 7
     rank = int(rng.integers(count))
-    assert value_at(rank, keys, 5, count, np.empty(count + 24)) == np.sort(keys[5:])[rank]
+    assert alone(value_at)(rank, keys, 5, count, np.empty(count + 24)) == np.sort(keys[5:])[rank]
 
 
 @given(SEEDS, st.integers(0, 200))
 def test_places_are_sorted_by_all_three_coordinates(seed, count):
     xyz = np.random.default_rng(seed).integers(0, 4, (count, 3)).astype(float)
     x, y, z, order = *np.ascontiguousarray(xyz.T), np.arange(count)
-    sort_places(x, y, z, order, 0, count)
+    alone(sort_places)(x, y, z, order, 0, count)
     expected = sorted(map(tuple, xyz.tolist()))
     assert list(zip(x.tolist(), y.tolist(), z.tolist(), strict=True)) == expected
     np.testing.assert_array_equal(xyz[order], np.reshape(expected, (-1, 3)))
@@ -55,3 +56,10 @@ def test_index_holds_every_point_once_and_its_boxes_hold_the_points(n):
         assert 0 < inside.shape[1] <= BUCKET
         np.testing.assert_array_equal(index.boxes[leaves + leaf], np.r_[inside.min(axis=1), inside.max(axis=1)])
     np.testing.assert_array_equal(index.boxes[1], np.r_[lower, upper])
+
+
+@given(SEEDS, st.integers(1, 300), st.sampled_from([0.0, 0.25, 0.5, 1.0]))
+def test_quantiles_are_numpys(seed, count, share):
+    values = np.random.default_rng(seed).integers(0, 50, count + 3) / 7
+    expected = np.quantile(values[:count], share)
+    assert alone(quantile)(values, count, share) == pytest.approx(expected, rel=1e-14)

@@ -5,7 +5,7 @@ import pytest
 
 import edgel
 from edgel import EdgeKind, metrics, synth
-from edgel._neighbors.orientation import _join
+from edgel._neighbors.pieces import UNIT, Pairs, join
 
 
 def cube(side=30, jitter=0.0, seed=0):
@@ -115,7 +115,9 @@ def test_pairs_are_joined_by_the_sum_of_what_they_say():
     """Two pieces of three, between which one strong pair errs and two weaker ones are right."""
     pairs = [(0, 1, 1.0), (1, 2, -1.0), (3, 4, 1.0), (4, 5, 1.0), (0, 3, 0.9), (1, 4, -0.6), (2, 5, 0.6), (6, 7, -0.1)]
     a, b, weight = (np.array(column) for column in zip(*pairs, strict=True))
-    sign, piece = _join(a, b, weight)
-    assert piece.tolist() == [0, 0, 0, 0, 0, 0, 1, 1]
+    pairs = Pairs(a, b, np.rint(weight * UNIT).astype(np.int64), np.ones(len(a), np.int64))
+    sign, root = join(pairs, 8)
+    assert root[:6].tolist() == [root[0]] * 6
+    assert root[0] != root[6] == root[7]
     assert (sign[:6] * sign[0]).tolist() == [1, 1, -1, -1, -1, -1]
     assert sign[6] == -sign[7]

@@ -5,6 +5,7 @@ import math
 import naive
 import numpy as np
 import pytest
+from alone import alone
 
 from edgel._kernels.simd import LANES
 from edgel._neighbors.kdtree import build_index
@@ -40,7 +41,7 @@ def neighbourhood(rng, count=96, noise=0.05, bend=0.6):
 def test_plane_fits_at_each_scale_match_numpy(seed):
     vectors = neighbourhood(np.random.default_rng(seed))
     normals, features = np.zeros((len(SCALES), 4)), np.zeros(plane_scales.NUM_FEATURES)
-    fit_scales(rows(vectors), (vectors**2).sum(axis=1), np.array(SCALES), normals, features)
+    alone(fit_scales)(rows(vectors), (vectors**2).sum(axis=1), np.array(SCALES), normals, features)
     for s, k in enumerate(SCALES):
         assert abs(normals[s, :3] @ naive.covariance_plane(vectors[:k])[0]) == pytest.approx(1, abs=1e-9)
         expected = naive.plane_scale(vectors[:k], math.sqrt(math.pi * (vectors[15] ** 2).sum() / 16))
@@ -94,9 +95,9 @@ def fitted_in_step(lanes, count):
         for i in range(count):  # the small plane of each neighbour
             near = np.argsort(((vectors - vectors[i]) ** 2).sum(axis=1))[:8]
             planes[i, :3], planes[i, 3] = naive.covariance_plane(vectors[near])[0], 1
-    scratch = two_planes.make_scratch()
+    scratch = alone(two_planes.make_scratch)()
     features, found = np.empty(two_planes.NUM_FEATURES * LANES), np.empty(hinge.HINGE * LANES)
-    fit_two_planes(in_step(lanes), in_step(around), count, np.ones(LANES), scratch, features, found)
+    alone(fit_two_planes)(in_step(lanes), in_step(around), count, np.ones(LANES), scratch, features, found)
     return features.reshape(-1, LANES).T, found.reshape(-1, LANES).T
 
 
@@ -150,7 +151,7 @@ def test_sectors_match_the_naive_ones(seed):
     squared = (vectors**2).sum(axis=1)
     normals, features = np.tile([0.0, 0.0, 1.0, 1.0], (3, 1)), np.empty(sectors.NUM_FEATURES)
     angles, (begins, ends) = np.empty(len(vectors)), np.empty((2, sectors.BINS))
-    sector_gaps(rows(vectors), squared, normals, np.array(sectors.COUNTS), angles, begins, ends, features)
+    alone(sector_gaps)(rows(vectors), squared, normals, np.array(sectors.COUNTS), angles, begins, ends, features)
     for s, k in enumerate(sectors.COUNTS):
         widest, second = naive.two_widest_sectors(vectors[:k, :2])
         assert features[2 * s + sectors.WIDEST] == pytest.approx(widest, abs=1e-7)
@@ -166,8 +167,8 @@ def test_planes_through_the_point_match_the_naive_ones(seed, count, inlier):
     planes = np.empty((3, minimal_planes.PLANES), np.float32)
     off = np.zeros((minimal_planes.VOTERS, minimal_planes.PLANES), np.float32)
     score, features = np.empty(minimal_planes.PLANES, np.float32), np.empty(minimal_planes.NUM_FEATURES)
-    span_planes(rows(vectors), 1.0, planes, off)
-    planes_through(rows(vectors), count, 1.0, inlier, math.cos(0.35), planes, off, score, features)
+    alone(span_planes)(rows(vectors), 1.0, planes, off)
+    alone(planes_through)(rows(vectors), count, 1.0, inlier, math.cos(0.35), planes, off, score, features)
     expected = naive.two_planes_through(vectors[:count], minimal_planes.SPANNING, inlier, 0.35)
     assert features == pytest.approx([expected[name] for name in minimal_planes.FEATURES], abs=1e-3)
 

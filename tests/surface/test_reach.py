@@ -7,7 +7,7 @@ import edgel
 from edgel._neighbors.kdtree import build_index
 from edgel._surface import classify, cloud_statistics, screen
 from edgel._surface.leaves import describe_leaves
-from edgel._surface.reach import evidence_reach, screening_reach, settled
+from edgel._surface.reach import Bounds, evidence_reach, screening_reach, settled
 
 
 def probabilities(index, statistics):
@@ -49,7 +49,7 @@ def test_what_is_out_of_reach_changes_nothing(houses):
         result[part.order] = radii
     sure = reach < cut - tile[:, 0]  # told by the tile alone
     told = np.empty(len(tile), bool)
-    told[part.order] = settled(part, leaves, cut - part.xyz[0], np.ones(len(part), bool))
+    told[part.order] = settled(part, leaves, Bounds.of(part, leaves), cut - part.xyz[0], np.ones(len(part), bool))
     np.testing.assert_array_equal(told, sure)  # most of them by their leaves
     assert sure.mean() > 0.3
     assert np.median(reach) < 60

@@ -2,19 +2,24 @@
 
 import json
 import os
+import socket
 import subprocess
 import sys
 from collections import namedtuple
 from itertools import pairwise
 from pathlib import Path
 
+import laspy
 import numpy as np
 import pytest
 
 import edgel
-from edgel import tiled
-from edgel.tiled import classify, engine, run
+from edgel import synth, tiled
+from edgel._neighbors.kdtree import build_index
+from edgel._neighbors.scan_lines import scan_line_stretch
+from edgel.tiled import aside, classify, disk, engine, passes
 from edgel.tiled.plan import Plan
+from edgel.tiled.spool import BYTES_A_POINT
 
 FIELDS = ("kind", "strength", "position", "position_std", "scale", "direction", "normals", "angle", "convex")
 
@@ -45,12 +50,55 @@ def test_any_tiling_gives_the_answer_of_the_whole(files, strip, whole, tmp_path,
         assert edgel.read(output).xyz.tobytes() == np.load(file)[found.edges(number).index].tobytes()
 
 
+def test_tiles_in_any_order_give_the_same(files, whole, tmp_path, monkeypatch):
+    here = engine._here
+    monkeypatch.setattr(engine, "_here", lambda task, jobs: here(task, dict(reversed(jobs.items()))))
+    check_same(tiled.detect(files, tmp_path / "out", tile_points=3_500), whole, lengths_of(files))
+
+
 def test_a_sensor_tells_the_outside_in_tiles_too(files, strip, tmp_path):
     above = strip.mean(axis=0) + [0, 0, 900.0]
     wanted = edgel.detect(strip, method="surface", viewpoint=above, kinds="crease", min_strength=0.3)
     found = tiled.detect(files, tmp_path / "out", tile_points=3_000, viewpoint=above, kinds="crease", min_strength=0.3)
     check_same(found, wanted, lengths_of(files))
     assert (wanted.convex == 1).any()
+
+
+@pytest.mark.parametrize("tile_points", [2_000, 6_000])
+def test_the_outside_of_a_whole_surface_is_told_in_tiles(tmp_path, tile_points):
+    solid = synth.sample(synth.stepped_block(), pattern="blue_noise", spacing=0.9, noise=0.05, seed=3)
+    xyz = np.concatenate([solid.cloud.xyz, solid.cloud.xyz + [90.0, 4.0, 0.0]])
+    wanted = edgel.detect(xyz, method="surface", orient="outward")
+    names = [str(tmp_path / f"{number}.npy") for number in range(2)]
+    for name, part in zip(names, (xyz[::2], xyz[1::2]), strict=True):
+        np.save(name, part)
+    order = np.concatenate([np.arange(0, len(xyz), 2), np.arange(1, len(xyz), 2)])
+    wanted = edgel.detect(xyz[order], method="surface", orient="outward")
+    found = tiled.detect(names, tmp_path / "out", tile_points=tile_points, orient="outward")
+    assert found.num_tiles > 1
+    check_same(found, wanted, lengths_of(names))
+    assert found.edges(0).orientation == "outward"
+    assert (wanted.convex == 1).sum() > 100
+    assert (wanted.convex == -1).sum() > 10
+
+
+def test_normals_of_the_cloud_tell_the_outside_in_tiles(files, strip, tmp_path):
+    up = np.tile([0.0, 0.1, -1.0], (len(strip), 1))
+    names, first = [], 0
+    for number, length in enumerate(lengths_of(files)):
+        rows = slice(first, first + length)
+        columns = {name: up[rows, axis] for axis, name in enumerate(("nx", "ny", "nz"))}
+        names.append(str(tmp_path / f"with{number}.npz"))
+        edgel.write(names[-1], edgel.Cloud(strip[rows], columns))
+        first += length
+    cloud = edgel.Cloud(strip, {name: up[:, axis] for axis, name in enumerate(("nx", "ny", "nz"))})
+    wanted = edgel.detect(cloud, method="surface")
+    assert wanted.orientation == "normals"
+    found = tiled.detect(names, tmp_path / "out", tile_points=3_000)
+    check_same(found, wanted, lengths_of(files))
+    assert (wanted.convex != 0).sum() > 100
+    with pytest.raises(ValueError, match=r"with0.npz: has normals of its own .*line1.npy has none"):
+        tiled.detect([names[0], files[1]], tmp_path / "mixed")
 
 
 def test_two_workers_give_the_same(files, whole, tmp_path):
@@ -79,9 +127,12 @@ def test_a_run_that_was_killed_goes_on(files, whole, tmp_path):
     kept = {path: path.stat().st_mtime_ns for path in (out / "work").rglob("*.npz")}
     assert kept
     (out / "work" / "label").mkdir(exist_ok=True)
-    (out / "work" / "label" / "000000.123.part.npz").write_bytes(b"half")  # what a kill may leave
+    dead = f"{socket.gethostname()}.{2**22 + 1}.part"  # what a kill may leave: no process has such a number
+    (out / "work" / "label" / f"000000.npz.{dead}").write_bytes(b"half")
+    (out / "work" / "spool" / f"000000.{dead}").mkdir()
     found = tiled.detect(files, out, tile_points=3_500)
     check_same(found, whole, lengths_of(files))
+    assert not list(out.rglob("*.part"))
     assert {path: path.stat().st_mtime_ns for path in kept} == kept  # nothing was done twice
     again = {path: path.stat().st_mtime_ns for path in out.rglob("*.np[yz]")}
     tiled.detect(files, out, tile_points=3_500)
@@ -97,7 +148,7 @@ def test_a_tile_that_fails_is_tried_alone_and_named(files, whole, tmp_path, monk
             raise OSError("no luck")
         real(plan, answer, tile)
 
-    monkeypatch.setattr(run, "classify_tile", failing)
+    monkeypatch.setattr(passes, "classify_tile", failing)
     with pytest.raises(tiled.TileError, match=r"tile 1 \(x .*no luck.*all others are done"):
         tiled.detect(files, tmp_path / "out", tile_points=3_500)
     assert calls == [*range(max(calls) + 1), 1]  # all, and that one once more
@@ -148,6 +199,28 @@ def test_what_is_not_one_cloud_is_refused(strip, tmp_path):
         tiled.detect([tmp_path / "a.laz", tmp_path / "a.laz"], tmp_path / "out")
 
 
+def test_scan_lines_are_stretched_in_tiles_too(tmp_path):
+    rng = np.random.default_rng(5)
+    x, y = (grid.ravel() for grid in np.meshgrid(np.arange(0, 160.0, 0.2), np.arange(0, 36.0, 1.5)))
+    x, y = x + rng.uniform(-0.05, 0.05, len(x)), y + 0.005 * rng.standard_normal(len(x))
+    roof = (np.abs(x % 40 - 20) < 11) & (np.abs(y - 17) < 9)
+    z = np.where(roof, 9 + 0.6 * (9 - np.abs(y - 17)), 0) + 0.005 * rng.standard_normal(len(x))
+    xyz = np.column_stack([x, y, z])
+    wanted = edgel.detect(xyz, method="surface")
+    assert scan_line_stretch(build_index(xyz)) is not None
+    np.save(tmp_path / "lines.npy", xyz)
+    found = tiled.detect([tmp_path / "lines.npy"], tmp_path / "out", tile_points=5_000)
+    assert found.num_tiles > 2
+    check_same(found, wanted, [len(xyz)])
+    assert len(wanted) > 200
+
+
+def test_scans_of_one_file_are_points_of_the_cloud(strip, whole, tmp_path):
+    scans = np.repeat([0, 1], [10_000, len(strip) - 10_000]).astype(np.uint8)
+    edgel.write(tmp_path / "a.npz", edgel.Cloud(strip, {"scan_index": scans}))
+    check_same(tiled.detect([tmp_path / "a.npz"], tmp_path / "out", tile_points=5_000), whole, [len(strip)])
+
+
 def test_much_noise_is_refused(strip, tmp_path):
     noisy = strip + np.random.default_rng(0).normal(0, 1.0, strip.shape)
     np.save(tmp_path / "noisy.npy", noisy)
@@ -160,6 +233,50 @@ def test_a_disk_that_is_too_small_is_told_before(files, tmp_path, monkeypatch):
     monkeypatch.setattr("shutil.disk_usage", lambda path: usage(10, 9, 1))
     with pytest.raises(OSError, match="larger disk"):
         tiled.detect(files, tmp_path / "out")
+
+
+def test_a_disk_that_fills_up_is_told_by_what_the_first_tiles_took(files, whole, tmp_path, monkeypatch):
+    usage, took = namedtuple("usage", "total used free"), (BYTES_A_POINT + disk.RESULTS) * sum(lengths_of(files))
+    monkeypatch.setattr("shutil.disk_usage", lambda path: usage(10**12, 0, int(took * 1.01)))
+    with pytest.raises(OSError, match="go on with the same call"):
+        tiled.detect(files, tmp_path / "out", tile_points=3_500)
+    work = tmp_path / "out" / "work"
+    assert len(list((work / "classify").iterdir())) < len(Plan.read(work).tiles)
+    monkeypatch.undo()
+    check_same(tiled.detect(files, tmp_path / "out", tile_points=3_500), whole, lengths_of(files))
+
+
+def test_what_others_are_writing_is_left_alone(tmp_path):
+    for name in ("a.npz.elsewhere.12.part", f"b.npz.{socket.gethostname()}.{os.getpid()}.part"):
+        (tmp_path / name).touch()
+    aside.clear_stale(tmp_path)
+    assert len(list(tmp_path.iterdir())) == 2
+    os.utime(tmp_path / "a.npz.elsewhere.12.part", (1, 1))
+    aside.clear_stale(tmp_path)
+    assert [path.name[0] for path in tmp_path.iterdir()] == ["b"]
+
+
+@pytest.mark.parametrize("suffix", [".npy", ".laz", ".las"])
+def test_files_are_read_a_stretch_at_a_time(strip, tmp_path, monkeypatch, suffix):
+    rounded = strip.round(2)
+    edgel.write(tmp_path / f"a{suffix}", edgel.Cloud(rounded))
+    xyz = edgel.read(tmp_path / f"a{suffix}").xyz
+    monkeypatch.setattr("edgel.io.chunks.ROWS", 2_345)
+    found = tiled.detect([tmp_path / f"a{suffix}"], tmp_path / "out", tile_points=5_000)
+    check_same(found, edgel.detect(xyz, method="surface"), [len(strip)])
+    assert edgel.read(found.outputs[0]).xyz.tobytes() == xyz[found.edges(0).index].tobytes()
+
+
+def test_copc_comes_out(strip, tmp_path):
+    edgel.write(tmp_path / "a.laz", edgel.Cloud(strip, {"intensity": np.arange(len(strip), dtype=np.uint16)}))
+    found = tiled.detect([tmp_path / "a.laz"], tmp_path / "out", extension=".copc.laz")
+    assert found.outputs == [str(tmp_path / "out" / "a.copc.laz")]
+    with laspy.CopcReader.open(found.outputs[0]) as reader:
+        points = reader.query()
+    assert sorted(np.asarray(points["intensity"])) == found.edges(0).index.tolist()  # COPC has an order of its own
+    (item,) = json.loads((tmp_path / "out" / "edges.vpc").read_text())["features"]
+    assert (item["id"], item["properties"]["pc:encoding"]) == ("a", "copc")
+    assert item["properties"]["pc:count"] == found.num_edges > 0
 
 
 def test_an_index_lists_the_files(strip, tmp_path):
@@ -180,7 +297,7 @@ def test_tiles_share_no_point_and_leave_none_out(files, strip, tmp_path):
     held = np.sum([tile.holds(strip) for tile in plan.tiles], axis=0)
     assert (held == 1).all()
     loaded = [plan.spool.load(tile) for tile in plan.tiles]
-    assert all((np.diff(keys) > 0).all() for _, keys in loaded)
+    assert len(np.unique(np.concatenate([keys for _, keys in loaded]))) == len(strip)
     assert sorted(map(tuple, np.concatenate([xyz for xyz, _ in loaded]))) == sorted(map(tuple, strip))
     assert all(a.high != b.high or a.low != b.low for a, b in pairwise(plan.tiles))
 

@@ -11,7 +11,7 @@ from typer.core import TyperGroup
 from typer.exceptions import TyperException
 
 import edgel
-from edgel._cli import convert, demo, detect, info, lines, match, normals, render, view
+from edgel._cli import convert, demo, detect, info, lines, match, normals, render, view, warmup
 from edgel._cli.help import Command, help_text, without_type
 from edgel._cli.methods import MethodCommand
 from edgel.io.errors import printable
@@ -103,3 +103,4 @@ app.command(cls=MethodCommand, help=help_text(render.HELP))(render.render)
 app.command(cls=Command, help=help_text(lines.HELP))(lines.lines)
 app.command(cls=Command, help=help_text(match.HELP))(match.match)
 app.command(cls=Command, help=help_text(demo.HELP))(demo.demo)
+app.command(cls=Command, help=help_text(warmup.HELP))(warmup.warmup)

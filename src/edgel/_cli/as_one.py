@@ -16,7 +16,13 @@ from edgel._cli.output import count
 from edgel.edges import as_kinds
 
 GROUP = "One cloud in several files"
-_ANSWERED = {"kinds", "min_strength", "num_neighbors", "viewpoint"}  # options of `edgel.detect` that tiles know too
+_ANSWERED = {
+    "kinds",
+    "min_strength",
+    "num_neighbors",
+    "viewpoint",
+    "orient",
+}  # options of `edgel.detect` that tiles know too
 
 AsOne = Annotated[
     bool,

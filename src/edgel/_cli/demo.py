@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 HELP = """Repeat the published experiment: simulate a scanned tee and elbow, find their edges, time their normals.
 
 The paper's Tables 1 and 2 are printed beside what this machine finds. Into the folder go a report with figures, to look
-at in a browser, and the clouds and their edge points as PLY. It takes half a minute.
+at in a browser, and the clouds and their edge points as PLY. It takes half a minute, and needs Matplotlib
+(pip install 'edgel[plot]').
 
 \b
 Examples:
@@ -69,8 +70,11 @@ def demo(
     with exit_codes(debug=debug):
         with Watch() as watch:
             watch("starting")
-            from edgel._demo import file_names, run_demo  # not at the top: Matplotlib takes time to import
+            from edgel._demo import file_names, run_demo  # not at the top: it takes time to import
+            from edgel._report import check_drawing
 
+            with failing_as(ExitCode.OUTPUT, "demo"):
+                check_drawing()
             files.check_new_folder(directory, file_names(), inputs=(), no_clobber=not clobber)
 
             with failing_as(ExitCode.OUTPUT, directory, ["num_points"]):

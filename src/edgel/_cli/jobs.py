@@ -12,6 +12,7 @@ from edgel._cli import files
 from edgel._cli.compare import check_kept
 from edgel._cli.errors import ExitCode, Failure, as_option, failing_as
 from edgel.cloud import Cloud
+from edgel.io.files import COPC, stem
 
 _DOCUMENT = re.compile(r"(readme|licen[cs]e|copying|changelog|notice).*\.txt$", re.IGNORECASE)  # lies beside clouds
 
@@ -162,7 +163,7 @@ def output_names(sources: Sequence[str], extensions: Sequence[str]) -> list[Path
 def _renamed(place: Path, extension: str, whole: bool) -> Path:
     if place.suffix.lower() == extension:
         return place
-    return place.with_name((place.name if whole else place.stem) + extension)
+    return place.with_name((place.name if whole else stem(place) if extension == COPC else place.stem) + extension)
 
 
 def _extension_for(source: str, known: Sequence[str]) -> str:

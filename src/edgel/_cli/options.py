@@ -85,12 +85,13 @@ def given(**options: Any) -> dict[str, Any]:
 def extension(text: str | None) -> str | None:
     """Return the extension that ``--format`` names, with its dot, or raise a `Failure`."""
     from edgel.io import WRITERS
+    from edgel.io.files import COPC
 
     if text is None:
         return None
-    wanted = "." + text.lower().removeprefix(".")
-    if wanted not in WRITERS:
-        names = " ".join(name.removeprefix(".") for name in WRITERS)
+    wanted, known = "." + text.lower().removeprefix("."), (*WRITERS, COPC)
+    if wanted not in known:
+        names = " ".join(name.removeprefix(".") for name in known)
         raise Failure(ExitCode.USAGE, f"--format: {text!r} is no format that edgel writes; known: {names}")
     return wanted
 

@@ -11,6 +11,7 @@ from numba.core import event
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from edgel._cli.output import print_line, seconds, stderr_console
+from edgel._kernels.ahead import expected_seconds
 from edgel._kernels.cache import KernelCache
 from edgel.io.errors import printable
 
@@ -91,7 +92,7 @@ class Watch(event.Listener):
             return
         self._began = time.perf_counter()
         if self._bar is None and not self._told and not self._quiet:
-            print_line(f"{COMPILING} ...")
+            print_line(f"{COMPILING}, about {expected_seconds():.0f} s ...")
         self._told = True
         kernel = event.data["dispatcher"].py_func.__name__.strip("_").replace("_", " ")  # pyright: ignore[reportOptionalSubscript]
         self._describe(f"{self._stage}: {COMPILING}: {kernel}")

@@ -15,8 +15,10 @@ from edgel.edges import Edges
 def check_report(job: Job, reading: files.Reading) -> None:
     """Raise a `Failure` for a report that cannot be written, or must not."""
     if job.report is not None:
-        from edgel._report import file_names  # not at the top: Matplotlib takes time to import
+        from edgel._report import check_drawing, file_names  # not at the top: it takes time to import
 
+        with failing_as(ExitCode.OUTPUT, job.report):
+            check_drawing()
         names = file_names([_name_of(job.source)])
         inputs = [job.source, reading.intrinsics]
         files.check_new_folder(job.report, names, inputs=inputs, no_clobber=job.no_clobber)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from edgel._kernels.frames import tangents
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import kernel, routine
 
 TIE = 1e-6  # relative difference below which rounding would decide
 
@@ -100,7 +100,7 @@ def color_gradient(first, places, squared, queries, targets, xyz, normals, smoot
         out[1], out[2], out[3] = cosine * ux + sine * vx, cosine * uy + sine * vy, cosine * uz + sine * vz
 
 
-@kernel
+@routine
 def biweight(squared, largest):
     """Biweight kernel: its standard deviation along an axis is 0.35 of the radius."""
     share = 1.0 - squared / largest if largest > 0.0 else 1.0

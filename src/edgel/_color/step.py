@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from edgel._color.gradient import TIE, biweight
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import kernel, routine
 
 _PEAK = 0.5  # least curvature of the gradient across the edge: a ramp has none, a sharp step some 1.5
 _BAND = 0.75  # how far from the peak a point may lie, in spacings; those not nearest to it go later
@@ -42,7 +42,7 @@ def color_step(first, places, squared, queries, targets, xyz, at, raw, noise, no
         out[4], out[5], out[6] = n[1] * d[2] - n[2] * d[1], n[2] * d[0] - n[0] * d[2], n[0] * d[1] - n[1] * d[0]
 
 
-@kernel
+@routine
 def _peak(places, squared, across, gradients, direction):
     """Where a parabola fitted to the gradient's part along `direction` has its peak, in radii; inf without a peak."""
     k = len(places)
@@ -66,7 +66,7 @@ def _peak(places, squared, across, gradients, direction):
     return -0.5 * b / c if a > 0.0 and -c > _PEAK * a else np.inf
 
 
-@kernel
+@routine
 def _sides(places, squared, across, line, margin, raw, noise):
     """Contrast of the raw colors on either side of a line, and how many standard errors it is worth.
 

@@ -25,6 +25,8 @@ from numba.core import config
 from numba.core.caching import CompileResultCacheImpl, NullCache
 from numba.core.serialize import dumps
 
+from edgel._kernels.ahead import compiled_elsewhere
+
 _HASH = hashlib.sha256
 _HEAD = 2 * _HASH().digest_size  # bytes of a file before the kernel itself: its stamp, and the checksum
 
@@ -49,8 +51,12 @@ class KernelCache(NullCache):
         self._function = function
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return what was compiled for these types, None if there is nothing of use."""
+        """Return what was compiled for these types, here or meanwhile in another process, None if there is nothing."""
         target_context.refresh()
+        found = self._read(sig, target_context)
+        return self._read(sig, target_context) if found is None and compiled_elsewhere(self._function) else found
+
+    def _read(self, sig: Any, target_context: Any) -> Any:
         try:
             content = self._path(sig, target_context.codegen()).read_bytes()
             if content[:_HEAD] != self._head(content[_HEAD:]):

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import routine
 
 _LEAST = 1e-12  # of a pivot: below, the matrix leaves the unknown open
 
 
-@kernel
+@routine
 def factorize(matrix, lower, inverse):
     """Write the factor L of a symmetric positive matrix (K, K), and the inverse of L, both lower triangles.
 
@@ -35,7 +35,7 @@ def factorize(matrix, lower, inverse):
         inverse[i, i] = own
 
 
-@kernel
+@routine
 def explain(inverse, right, along):
     """Write what the unknowns explain, one after the other: a sum of squares falls by the square of each.
 
@@ -47,7 +47,7 @@ def explain(inverse, right, along):
             along[i] += inverse[i, k] * right[k]
 
 
-@kernel
+@routine
 def solve(inverse, along, solution):
     """Write the first unknowns (M,), the others left out, and return by how much they let a sum of squares fall."""
     fall, size = 0.0, len(solution)
@@ -59,7 +59,7 @@ def solve(inverse, along, solution):
     return fall
 
 
-@kernel
+@routine
 def variance_of(inverse, size, i):
     """Return the variance of an unknown, over that of the residuals: the i-th of the inverse's diagonal."""
     total = 0.0

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 
 from edgel._kernels.frames import across, across_of_eight
-from edgel._kernels.parallel import kernel, part
+from edgel._kernels.parallel import part, routine
 from edgel._kernels.simd import larger, root, spread, where
 
 _EQUAL = 1e-7  # of the trace: eigenvalues nearer each other than that are not told apart
 
 
-@kernel
+@routine
 def smallest_eigenpair(xx, xy, xz, yy, yz, zz):
     """Return the smallest and the middle eigenvalue of a symmetric 3 x 3 matrix, and the former's unit eigenvector.
 
@@ -60,7 +60,7 @@ def smallest_eigenpair(xx, xy, xz, yy, yz, zz):
     return smallest * scale, middle * scale, x, y, z
 
 
-@kernel
+@routine
 def _longest_row(a, xy, xz, b, yz, c):
     """Return the longest row of a symmetric matrix."""
     u, v, w = a, xy, xz

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from edgel._kernels.parallel import kernel, part
+from edgel._kernels.parallel import part, routine
 from edgel._kernels.simd import magnitude, root, spread, where
 
 
-@kernel
+@routine
 def across(u, v, w):
     """Return a unit vector across another one (of a vector of no length, +X)."""
     if abs(u) <= abs(v) and abs(u) <= abs(w):
@@ -23,7 +23,7 @@ def across(u, v, w):
     return x / length, y / length, z / length
 
 
-@kernel
+@routine
 def tangents(nx, ny, nz):
     """Return two unit vectors across a unit normal and each other."""
     x, y, z = across(nx, ny, nz)

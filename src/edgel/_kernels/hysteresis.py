@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import kernel, routine
 from edgel._kernels.union_find import find_root
 
 
@@ -42,7 +42,7 @@ def levels(values: np.ndarray, weak: float, least: int, faintest: float) -> tupl
     return shown[found > 0], found[found > 0]
 
 
-@kernel
+@routine
 def _settle(root, until, weak, least, values, size, since, following, head, found):
     """Give the members of a chain that have no level yet the one that it reaches before it changes at `until`."""
     if size[root] < least:

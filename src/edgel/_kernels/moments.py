@@ -6,7 +6,7 @@ Moments are sums of 1, x, y, z, xx, xy, xz, yy, yz, zz, in this order.
 from __future__ import annotations
 
 from edgel._kernels.eigen import smallest_eigenpair, smallest_eigenpairs
-from edgel._kernels.parallel import kernel, part, summing_kernel
+from edgel._kernels.parallel import part, routine, summing_routine
 from edgel._kernels.rows import load_row, load_three, store_rows
 from edgel._kernels.simd import larger, multiply_add, spread, where
 
@@ -20,7 +20,7 @@ def scatter(ax, ay, az, bx, by, bz, xx, xy, xz, yy, yz, zz):
     return xx - ax * bx, xy - ax * by, xz - ax * bz, yy - ay * by, yz - ay * bz, zz - az * bz
 
 
-@summing_kernel
+@summing_routine
 def add_moments(vectors, start, stop, sums):
     """Add the moments of the points start..stop-1 of `vectors` (3, K) to `sums` (9,), which leaves out their number."""
     xs, ys, zs = vectors[0], vectors[1], vectors[2]
@@ -41,7 +41,7 @@ def add_moments(vectors, start, stop, sums):
     sums[8] += zz
 
 
-@kernel
+@routine
 def move_moments(sums, x, y, z, out):
     """Add moments (10,) about their own centroid, which lies at x, y, z, to moments `out` (10,) about the origin."""
     n = sums[0]
@@ -57,7 +57,7 @@ def move_moments(sums, x, y, z, out):
     out[9] += sums[9] + n * z * z
 
 
-@kernel
+@routine
 def plane_of_moments(sums, plane):
     """Fit a plane to points of moments `sums` (10,): normal, centroid into `plane` (6,); returns the squares left."""
     n, sx, sy, sz = sums[0], sums[1], sums[2], sums[3]
@@ -69,7 +69,7 @@ def plane_of_moments(sums, plane):
     return max(smallest, 0.0)
 
 
-@kernel
+@routine
 def add_moments_of_eight(vectors, count, beyond, sums):
     """Sum the moments of the neighbours beyond a plane into `sums` (10 rows).
 
@@ -90,7 +90,7 @@ def add_moments_of_eight(vectors, count, beyond, sums):
     store_rows(sums, 0, (n, mx, my, mz, xx, xy, xz, yy, yz, zz))
 
 
-@kernel
+@routine
 def planes_of_moments(sums, plane):
     """Fit planes to points of moments `sums` (10 rows): normal, centroid and squares left into `plane` (7 rows)."""
     sx, sy, sz = load_three(sums, 1)

@@ -7,57 +7,60 @@ of threads. A pool of our own is safe when called from several threads, where Nu
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
+from functools import cache, partial
 from typing import Any, TypeVar
 
 from numba import njit
 
 from edgel._kernels.cache import KernelCache
+from edgel._kernels.pieces import PieceCompiler, template_of, without_collection
+from edgel._kernels.threads import num_threads
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
+_ANY_ORDER = {"reassoc", "nsz", "contract"}
+
+
 def _compiled(function: F, **options: Any) -> F:
-    # Division by 0 gives infinity or NaN: a branch to an exception would keep every loop that divides off SIMD.
-    compiled: Any = njit(nogil=True, error_model="numpy", **options)(function)
+    # Division by 0 gives infinity or NaN: a branch to an exception would keep every loop that divides off SIMD. Nothing
+    # calls kernels from C.
+    chosen: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, **options}
+    return njit(**chosen)(function)
+
+
+def kernel(function: F, **options: Any) -> F:
+    """Compile a function that Python calls to machine code, without the GIL, kept on disk between runs."""
+    compiled: Any = _compiled(function, **options)
     if compiled is not function:  # as it is under NUMBA_DISABLE_JIT
         compiled._cache = KernelCache(function)
+        compiled.compile = partial(without_collection, compiled.compile)
     return compiled
 
 
-def kernel(function: F) -> F:
-    """Compile a function to machine code, without the GIL, kept on disk between runs."""
-    return _compiled(function)
+def routine(function: F, **options: Any) -> F:
+    """Compile a function that only kernels call, as a piece of each of them; Python cannot call it."""
+    compiled: Any = _compiled(function, no_cpython_wrapper=True, pipeline_class=PieceCompiler, **options)
+    if compiled is not function:
+        compiled.get_call_template = partial(template_of, compiled.get_call_template)
+    return compiled
 
 
-def summing_kernel(function: F) -> F:
-    """Compile like `kernel`, and let sums be taken in any order, so that loops over neighbours run on SIMD.
+def summing_routine(function: F) -> F:
+    """Compile like `routine`, and let sums be taken in any order, so that loops over neighbours run on SIMD.
 
     The order depends on the loop alone, so results stay the same for any number of threads; NaN and infinity keep their
     meaning. The moments of 32 neighbours take a quarter of the time so.
     """
-    return _compiled(function, fastmath={"reassoc", "nsz", "contract"})
+    return routine(function, fastmath=_ANY_ORDER)
 
 
 def part(function: F) -> F:
-    """Compile a part of kernels, which is inlined (an array passed costs seven words); Python cannot call it."""
-    return _compiled(function, forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
-
-
-def num_threads() -> int:
-    """Return how many threads kernels use: ``EDGEL_NUM_THREADS``, or the cores this process may run on."""
-    asked = os.environ.get("EDGEL_NUM_THREADS", "")
-    if asked and (not asked.isdigit() or int(asked) == 0):
-        raise ValueError(f"EDGEL_NUM_THREADS={asked!r}: expected a whole number above 0")
-    return (
-        int(asked)
-        if asked
-        else len(os.sched_getaffinity(0))
-        if hasattr(os, "sched_getaffinity")
-        else os.cpu_count() or 1
-    )
+    """Compile like `routine`, and inline it wherever it is called: an array passed costs seven words."""
+    return routine(function, forceinline=True)
 
 
 @cache
@@ -68,6 +71,9 @@ def _pool(threads: int) -> ThreadPoolExecutor:
 # A forked child inherits the pool without its threads, and would wait for them for ever: it makes its own.
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_pool.cache_clear)
+
+
+_thread = threading.local()
 
 
 def run_slices(compiled: Callable[..., Any], count: int, *arguments: Any, size: int = 8192) -> None:
@@ -85,7 +91,7 @@ def run_slices(compiled: Callable[..., Any], count: int, *arguments: Any, size: 
     starts = range(0, count, size)
     if not starts:
         return
-    threads = min(num_threads(), len(starts))
+    threads = 1 if getattr(_thread, "is_busy", False) else min(num_threads(), len(starts))
     if threads == 1:
         for start in starts:
             compiled(start, min(start + size, count), *arguments)
@@ -108,3 +114,33 @@ def run_slices(compiled: Callable[..., Any], count: int, *arguments: Any, size: 
         for _ in left:
             pass
         raise
+
+
+def run_each(work: Callable[[Any], None], things: Iterable[Any]) -> None:
+    """Call ``work(thing)`` for each thing, in parallel; the kernels that it runs stay on its thread.
+
+    Things are taken one at a time, as threads are done with those before.
+    """
+    left, over = iter(things), object()
+    lock, stopped = threading.Lock(), threading.Event()
+
+    def take() -> Any:
+        with lock:  # a generator cannot be entered by two
+            return over if stopped.is_set() else next(left, over)
+
+    def keep_on() -> None:
+        _thread.is_busy = True  # with a pool that waits for itself it would wait for ever
+        try:
+            while (thing := take()) is not over:
+                work(thing)
+        except BaseException:  # Ctrl-C too: what has not begun need not run any more
+            stopped.set()
+            raise
+        finally:
+            _thread.is_busy = False
+
+    threads = num_threads()
+    jobs = [_pool(threads - 1).submit(keep_on) for _ in range(threads - 1)]
+    keep_on()
+    for job in jobs:
+        job.result()

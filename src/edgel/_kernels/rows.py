@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel, part
+from edgel._kernels.parallel import part, routine
 from edgel._kernels.simd import LANES, load, store, where
 
 
-@kernel
+@routine
 def aligned(size):
     """Make an array that begins with a cache line: every eight that lie in two take twice as long."""
     scratch = np.empty(size + LANES)

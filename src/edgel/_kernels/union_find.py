@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import kernel, routine
 
 
-@kernel
+@routine
 def find_root(parents, member):
     """Return the root of a member's set, and shorten the way there."""
     while parents[member] != member:

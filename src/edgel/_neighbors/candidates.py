@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel, part
+from edgel._kernels.parallel import part, routine
 from edgel._kernels.rows import aligned
 from edgel._kernels.simd import LANES, bits, larger, load, spread
 from edgel._neighbors.kdtree import node_start
@@ -49,13 +49,13 @@ class Scratch(NamedTuple):
     ends: np.ndarray
 
 
-@kernel
+@routine
 def make_scratch():
     """Make the scratch buffers of a search."""
     return _scratch_for(_FEW, np.empty(_NEAR, np.int64), aligned(6 * _NEAR))
 
 
-@kernel
+@routine
 def _scratch_for(found, near, near_boxes):
     squared = aligned(LANES * LANES * found)
     return Scratch(
@@ -69,7 +69,7 @@ def _scratch_for(found, near, near_boxes):
     )
 
 
-@kernel
+@routine
 def larger_scratch(scratch):
     """Make buffers for four times as many blocks near eight queries, and keep those near the chunk."""
     return _scratch_for(4 * len(scratch.found), scratch.near, scratch.near_boxes)
@@ -90,7 +90,7 @@ def _same_place(boxes, node, other):
     return boxes[node, 0] == boxes[other, 0] and boxes[node, 1] == boxes[other, 1] and boxes[node, 2] == boxes[other, 2]
 
 
-@kernel
+@routine
 def traverse(tree, low_x, low_y, low_z, high_x, high_y, high_z, reach, k, found):
     """List the blocks of the leaves within a squared reach of a box, ascending; -1 if they are too many.
 
@@ -128,7 +128,7 @@ def traverse(tree, low_x, low_y, low_z, high_x, high_y, high_z, reach, k, found)
     return count
 
 
-@kernel
+@routine
 def kth_distance(tree, qx, qy, qz, k):
     """Squared distance of the k-th nearest point of one query: each time the nearer child of a node first."""
     x, y, z, boxes, num_points = tree.x, tree.y, tree.z, tree.boxes, len(tree.order)
@@ -164,7 +164,7 @@ def kth_distance(tree, qx, qy, qz, k):
     return best[k - 1]
 
 
-@kernel
+@routine
 def _gather_blocks(tree, queries, first, last, reach, k, scratch):
     """Gather the blocks near the queries first..last-1; returns how many, filled up to eights, or -1."""
     low_x, low_y, low_z = np.inf, np.inf, np.inf
@@ -207,7 +207,7 @@ def select_blocks(scratch, near, low_x, low_y, low_z, high_x, high_y, high_z, re
     return count
 
 
-@kernel
+@routine
 def gather_blocks(tree, queries, first, last, reach, k, scratch):
     """Gather the blocks near the queries first..last-1, which lie together, for `nearest_of_eight`.
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel, run_slices
+from edgel._kernels.parallel import kernel, routine, run_slices
 from edgel._kernels.simd import LANES, larger, largest_of, load, smaller, smallest_of, spread
 from edgel._neighbors.selection import sort_leaf, sort_places, value_at
 
@@ -70,13 +70,7 @@ class NeighborIndex:
 
         `total` is the number of points of the cloud that these are a part of, by default their own.
         """
-        total = len(self) if total is None else total
-        if total <= number:
-            return np.arange(len(self))
-        chosen = np.empty(len(self), np.bool_)
-        below = np.uint64(2**64 * number // total)
-        run_slices(_choose, len(self), self.xyz.view(np.uint64), below, chosen, size=65536)
-        return np.flatnonzero(chosen)
+        return np.flatnonzero(chosen(self.xyz, number, len(self) if total is None else total))
 
     def evenly_sampled(self, number: int) -> np.ndarray:
         """Return about `number` places, evenly sampled over the tree, whatever the order of the input."""
@@ -116,6 +110,17 @@ def build_index(xyz: np.ndarray) -> NeighborIndex:
     boxes[0] = 0.0
     _inner_boxes(1 << depth, boxes)
     return NeighborIndex(here[1], here[0], boxes, blocks)
+
+
+def chosen(xyz: np.ndarray, number: int, total: int) -> np.ndarray:
+    """Choose about `number` of `total` points, of which these are (3, N) float64, by a hash of the coordinates alone.
+
+    Returns (N,) bool; all where there are no more. A smaller number chooses some of the same.
+    """
+    some = np.ones(xyz.shape[1], np.bool_)
+    if total > number:
+        run_slices(_choose, len(some), xyz.view(np.uint64), np.uint64(2**64 * number // total), some, size=65536)
+    return some
 
 
 @kernel
@@ -174,7 +179,7 @@ def node_start(number, count, nodes):
     return min(number * ((count + LANES - 1) // LANES) // nodes * LANES, count)
 
 
-@kernel
+@routine
 def _extent(values, first, last):
     """Smallest and largest of values[first:last]."""
     low, high = spread(np.inf), spread(-np.inf)
@@ -188,7 +193,7 @@ def _extent(values, first, last):
     return least, most
 
 
-@kernel
+@routine
 def _box(xyz, first, last, box):
     """Lower and upper corner of the places first..last-1; returns the widest axis."""
     widest = 0
@@ -199,7 +204,7 @@ def _box(xyz, first, last, box):
     return widest
 
 
-@kernel
+@routine
 def _split_node(node, level, xyz, order, to_xyz, to_order, scratch, box):
     """Halve a node at the median of its widest axis, from one pair of arrays into the other."""
     count, nodes = xyz.shape[1], 1 << level
@@ -228,7 +233,7 @@ def _split_node(node, level, xyz, order, to_xyz, to_order, scratch, box):
         sort_places(to_key, to_second, to_third, to_order, left, tied)
 
 
-@kernel
+@routine
 def _make_scratch(node, count, nodes):
     """Make a scratch buffer for the keys of a node, and some more to fill up eights."""
     return np.empty(node_start(node + 1, count, nodes) - node_start(node, count, nodes) + LANES + BUCKET)

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import math
 
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import routine
 
 
-@kernel
+@routine
 def relative(places, queries, query, xyz, vectors):
     """Write the neighbours relative to the query into `vectors` (3, k), stretched where it has a stretch."""
     for axis in range(3):
@@ -29,7 +29,7 @@ def relative(places, queries, query, xyz, vectors):
                 zs[i] += along * tz
 
 
-@kernel
+@routine
 def stretch(own, vector, at):
     """Take the vector that begins at `vector[at]` into the space that the stretch `own` (3,) makes."""
     length = math.sqrt(own[0] ** 2 + own[1] ** 2 + own[2] ** 2)
@@ -37,7 +37,7 @@ def stretch(own, vector, at):
         _add_along(own, 1.0 / length, vector, at)
 
 
-@kernel
+@routine
 def unstretch(own, vector, at):
     """Take a vector back from the space that the stretch `own` (3,) makes."""
     length = math.sqrt(own[0] ** 2 + own[1] ** 2 + own[2] ** 2)
@@ -45,33 +45,33 @@ def unstretch(own, vector, at):
         _add_along(own, -1.0 / (length * (1.0 + length)), vector, at)
 
 
-@kernel
+@routine
 def stretch_direction(own, direction, at):
     """Take the direction of a line to that of the line there; returns how long it was before it was made a unit."""
     stretch(own, direction, at)
     return _normalize(direction, at)
 
 
-@kernel
+@routine
 def unstretch_direction(own, direction, at):
     """Take the direction of a line back."""
     unstretch(own, direction, at)
     _normalize(direction, at)
 
 
-@kernel
+@routine
 def stretch_normal(own, normal, at):
     """Take a normal of a plane to that of the plane there, a unit: it goes the way back."""
     unstretch_direction(own, normal, at)
 
 
-@kernel
+@routine
 def unstretch_normal(own, normal, at):
     """Take a normal back; returns how long it was before it was made a unit again."""
     return stretch_direction(own, normal, at)
 
 
-@kernel
+@routine
 def drop_foot(place, at, direction, begin):
     """Move a place on a line along it to where it is nearest to the origin: another point of it in another space."""
     along = 0.0
@@ -81,14 +81,14 @@ def drop_foot(place, at, direction, begin):
         place[at + axis] -= along * direction[begin + axis]
 
 
-@kernel
+@routine
 def _add_along(own, factor, vector, at):
     along = factor * (vector[at] * own[0] + vector[at + 1] * own[1] + vector[at + 2] * own[2])
     for axis in range(3):
         vector[at + axis] += along * own[axis]
 
 
-@kernel
+@routine
 def _normalize(vector, at):
     length = math.sqrt(vector[at] ** 2 + vector[at + 1] ** 2 + vector[at + 2] ** 2)
     if length > 0.0:

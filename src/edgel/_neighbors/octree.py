@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel, run_slices
+from edgel._kernels.parallel import kernel, routine, run_slices
 from edgel._neighbors.kdtree import NeighborIndex
 
 MOST, FEWEST = 48, 8  # points of a leaf: a cell with more is cut, what has fewer joins another part of the same cell
@@ -66,7 +66,7 @@ def build_octree(index: NeighborIndex, size: float) -> Octree:
     return Octree(places, np.append(np.flatnonzero(begins), count), size)
 
 
-@kernel
+@routine
 def step_within(x, size):
     """Return how far in its top cell a coordinate lies, in whole steps of ``2**-BITS`` of the cell's size."""
     cells = x / size
@@ -94,7 +94,7 @@ def _split_cells(start, stop, first, runs, into, xyz, size, places, begins):
         _split(xyz, size, places[begin:end], begins[begin:end])
 
 
-@kernel
+@routine
 def _split(xyz, size, places, begins):
     """Cut a top cell: nodes that hold too many points are cut in turn, each on a stack of what is left to do."""
     count = len(places)
@@ -111,7 +111,7 @@ def _split(xyz, size, places, begins):
     number, to, slots = np.empty(8, np.int64), np.empty(8, np.int64), np.empty(9, np.int64)
     while left > 0:
         left -= 1
-        low, high, level = todo[left]
+        low, high, level = todo[left, 0], todo[left, 1], todo[left, 2]
         number[:] = 0
         shift = BITS - 1 - level
         for i in range(low, high):
@@ -139,11 +139,13 @@ def _split(xyz, size, places, begins):
             other[into] = places[i]
             for axis in range(3):
                 there[axis, into] = here[axis, i]
-        places[low:high] = other[low:high]
-        here[:, low:high] = there[:, low:high]
+        for i in range(low, high):
+            places[i] = other[i]
+            for axis in range(3):
+                here[axis, i] = there[axis, i]
 
 
-@kernel
+@routine
 def _join_few(number, to):
     """Say with which octant (8,) the points of each go: with fewer than `FEWEST`, with the largest that is not cut."""
     largest = -1

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
 import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,9 +11,22 @@ from edgel._kernels.frames import tangents
 from edgel._kernels.parallel import kernel
 from edgel._neighbors.kdtree import NeighborIndex
 from edgel._neighbors.knn import visit_neighbors
-from edgel._neighbors.normals import OUTWARD, OWN, SENSOR, UNKNOWN, Normals, fit_planes, no_planes
+from edgel._neighbors.normals import OUTWARD, OWN, SENSOR, UNKNOWN, Normals, fit_nearest, no_planes
+from edgel._neighbors.pieces import (
+    BINS,
+    SURELY,
+    UNIT,
+    Outermost,
+    Pairs,
+    bins_of,
+    cell_size,
+    join,
+    least_bin,
+    within_cells,
+)
 from edgel._neighbors.queries import Queries, every_place
 from edgel._neighbors.scan_lines import scan_line_normals, scan_line_stretch
+from edgel._neighbors.spacing import cloud_spacing
 from edgel._objects import NORMALS
 from edgel.cloud import Cloud
 
@@ -26,10 +39,7 @@ _PARALLEL = (
     0.8  # cosine of two planes that may be both sides of a plate, whose lines lie farther apart than it is thick
 )
 _STEP = (0.05, 0.6)  # share off the planes, squared, of the way between points on them that does not tell
-SPARSE = 2.0  # times the median distance of neighbours: points that lie farther apart may be stray
-_DIRECTIONS = np.array(
-    [np.array(d) / np.linalg.norm(d) for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)]
-)
+SPARSE = 2.7  # spacings of the cloud: points that lie farther apart may be stray, the usual is 1.3
 
 
 def check_orient(orient: str, *, has_viewpoint: bool) -> None:
@@ -47,15 +57,20 @@ def who_knows(orient: str, cloud: Cloud, *, sensor: bool) -> tuple[str, np.ndarr
     """
     if orient == OUTWARD or sensor:
         return orient if orient == OUTWARD else SENSOR, None
-    own = _own_normals(cloud)
+    own = own_normals(cloud)
     return UNKNOWN if own is None else OWN, own
 
 
-def _own_normals(cloud: Cloud) -> np.ndarray | None:
+def has_normals(cloud: Cloud) -> bool:
+    """Whether a cloud has columns nx, ny and nz."""
+    return {*NORMALS} <= {"_".join(name.split()).lower() for name in cloud.attributes}
+
+
+def own_normals(cloud: Cloud) -> np.ndarray | None:
     """Return the normals (N, 3) that came with a cloud as nx, ny, nz, None where it has none."""
-    names = {"_".join(name.split()).lower(): name for name in cloud.attributes}
-    if not {*NORMALS} <= set(names):
+    if not has_normals(cloud):
         return None
+    names = {"_".join(name.split()).lower(): name for name in cloud.attributes}
     columns = [cloud.attributes[names[name]] for name in NORMALS]
     if any(column.ndim != 1 or column.dtype.kind not in "fiu" for column in columns):
         return None
@@ -70,23 +85,68 @@ def outward_normals(index: NeighborIndex) -> np.ndarray:
     them or not (`_agree`). Pieces grow by joining the one they agree with most, or disagree with most, over all pairs
     between them: one pair that errs decides nothing. Last, the outermost points of each piece look outwards.
     """
-    order, count = index.order, len(index)
-    stretch = scan_line_stretch(index)
-    queries = every_place(index, stretch)
+    spacing = cloud_spacing(index)
+    found = agreement(index, scan_line_stretch(index), spacing)
+    order = np.lexsort(found.xyz.T[::-1])  # numbers by coordinates decide ties
+    found = found.ordered(order)
+    sign, root = join(within_cells(found.pairs, found.xyz, cell_size(spacing)), len(order), SURELY)
+    roots, piece = np.unique(root, return_inverse=True)
+    turn, body = join(found.pairs.renamed(piece, sign), len(roots))
+    sign, body = sign * turn[piece], np.unique(body, return_inverse=True)[1][piece]
+    normals, bins = found.normals * sign[:, None], bins_of(found.sure)
+    counts = np.bincount(body * BINS + bins, minlength=(body.max() + 1) * BINS).reshape(-1, BINS)
+    kept = bins >= least_bin(counts)[body]
+    signs = Outermost.of(found.xyz[kept], np.nan_to_num(normals[kept]), body[kept], len(counts)).signs
+    outward = np.empty_like(normals)
+    outward[index.order[order]] = normals * signs[body][:, None]
+    return outward
+
+
+@dataclass(frozen=True, eq=False)
+class Agreement:
+    """What points (N,) say of each other's normals.
+
+    Attributes
+    ----------
+    xyz : (N, 3) float64
+    normals : (N, 3) float64
+        Of either sign; NaN where there is none.
+    pairs : Pairs
+        Of each point, and the nearest in each sector.
+    sure : (N,) float64
+        How far they agree, or disagree, less 1 where points lie far apart.
+    """
+
+    xyz: np.ndarray
+    normals: np.ndarray
+    pairs: Pairs
+    sure: np.ndarray
+
+    def ordered(self, order: np.ndarray) -> Agreement:
+        """Return the same of points (N,) in another order."""
+        number = np.empty(len(order), np.int64)
+        number[order] = np.arange(len(order))
+        pairs = replace(self.pairs, a=number[self.pairs.a], b=number[self.pairs.b])
+        return Agreement(self.xyz[order], self.normals[order], pairs, self.sure[order])
+
+
+def agreement(index: NeighborIndex, stretch: np.ndarray | None, spacing: float) -> Agreement:
+    """Compare the normal at each place with the nearest in each of some sectors around it.
+
+    Takes the stretch (3, N) on scan lines, where there is one, and the cloud's spacing.
+    """
+    count, queries = len(index), every_place(index, stretch)
     planes = _steady_planes(index, queries)
     if stretch is not None:
         _put_lines(planes, index)
-    xyz, normals = np.ascontiguousarray(index.xyz.T), planes.normals
-    near, agreement = np.empty((count, SECTORS), np.int64), np.empty((count, SECTORS))
-    k = min(NEIGHBORS, count)
-    visit_neighbors(_agree, queries, index, k, normals, planes.offset, near, agreement)
-    reach = np.linalg.norm(xyz[near] - xyz[:, None], axis=2).mean(axis=1)
-    sign, piece = _join(np.repeat(np.arange(count), near.shape[1]), near.ravel(), agreement.ravel())
-    sure = (agreement * sign[:, None] * sign[near]).mean(axis=1) - (reach > SPARSE * np.median(reach))
-    sign *= _facing_out(xyz, normals * sign[:, None], sure, piece)[piece]
-    outward = np.empty((count, 3))
-    outward[order] = normals * sign[:, None]
-    return outward
+    near, agree = np.empty((count, SECTORS), np.int64), np.empty((count, SECTORS))
+    visit_neighbors(_agree, queries, index, min(NEIGHBORS, count), planes.normals, planes.offset, near, agree)
+    xyz, weight = np.ascontiguousarray(index.xyz.T), np.rint(agree * UNIT).astype(np.int64)
+    away = np.linalg.norm(xyz[near] - xyz[:, None], axis=2).mean(axis=1)
+    own = np.repeat(np.arange(count), SECTORS)
+    pairs = Pairs(own, near.ravel(), weight.ravel(), np.ones(len(own), np.int64))
+    sure = np.abs(agree).mean(axis=1) - (away > SPARSE * spacing)
+    return Agreement(xyz, planes.normals, pairs, sure)
 
 
 def _steady_planes(index: NeighborIndex, queries: Queries) -> Normals:
@@ -99,7 +159,7 @@ def _steady_planes(index: NeighborIndex, queries: Queries) -> Normals:
     for k in COUNTS:
         if k > len(index) and k > COUNTS[0]:
             break
-        more = fit_planes(index, queries, k)
+        more = fit_nearest(index, queries, k)
         now = np.sqrt(more.residual / (k - 3))
         going_on &= ~(now > WORSE * spread)
         rows = np.flatnonzero(going_on)
@@ -156,60 +216,3 @@ def _agree(first, places, squared, queries, targets, xyz, normals, offset, near,
                 left -= 1
                 if left == 0:
                     break
-
-
-def _join(a: np.ndarray, b: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Give the ends of pairs a sign each, so that pairs of positive weight get equal ones; Boruvka's rounds.
-
-    Returns the signs (N,) and the piece (N,) that each belongs to: what pairs connect.
-    """
-    piece = np.arange(int(max(a.max(), b.max())) + 1)
-    sign, number = np.ones(len(piece)), len(piece)
-    while True:
-        a, b, weight = _merged(a, b, weight, number)
-        if not len(a):
-            return sign, piece
-        parent, turn = _strongest(a, b, weight, number)
-        while (parent != parent[parent]).any():
-            turn, parent = turn * turn[parent], parent[parent]
-        weight, sign = weight * turn[a] * turn[b], sign * turn[piece]
-        roots, renamed = np.unique(parent, return_inverse=True)
-        a, b, piece, number = renamed[a], renamed[b], renamed[piece], len(roots)
-
-
-def _merged(a: np.ndarray, b: np.ndarray, weight: np.ndarray, number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Add up the pairs between the same two pieces, those within one left out."""
-    apart = a != b
-    a, b = np.minimum(a, b)[apart], np.maximum(a, b)[apart]
-    keys, which = np.unique(a * number + b, return_inverse=True)
-    return keys // number, keys % number, np.bincount(which, weight[apart], len(keys))
-
-
-def _strongest(a: np.ndarray, b: np.ndarray, weight: np.ndarray, number: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the piece that each joins, itself where it is the first of two that choose each other, and the sign."""
-    order = np.lexsort((b, a, -np.abs(weight)))
-    ends, others = np.stack([a, b], axis=1)[order].ravel(), np.stack([b, a], axis=1)[order].ravel()
-    pieces, at = np.unique(ends, return_index=True)
-    parent, turn = np.arange(number), np.ones(number)
-    parent[pieces], turn[pieces] = others[at], np.where(weight[order[at // 2]] < 0, -1.0, 1.0)
-    first = (parent[parent] == np.arange(number)) & (np.arange(number) < parent)
-    parent[first], turn[first] = np.flatnonzero(first), 1.0
-    return parent, turn
-
-
-def _facing_out(xyz: np.ndarray, normals: np.ndarray, sure: np.ndarray, piece: np.ndarray) -> np.ndarray:
-    """Return 1 for each piece (of the points, numbered from 0 on) whose outermost points look outwards, else -1.
-
-    Only the half of its points that is surest counts: stray points lie outermost of all.
-    """
-    order = np.lexsort((-sure, piece))
-    starts = np.flatnonzero(np.diff(piece[order], prepend=-1))
-    size = np.diff(starts, append=len(piece))
-    rank = np.arange(len(piece)) - np.repeat(starts, size)
-    kept = np.sort(order[rank < np.repeat((size + 1) // 2, size)])
-    votes, xyz, normals, piece = np.zeros(len(starts)), xyz[kept], np.nan_to_num(normals[kept]), piece[kept]
-    for direction in _DIRECTIONS:
-        far = np.lexsort((-(xyz @ direction), piece))
-        outermost = far[np.flatnonzero(np.diff(piece[far], prepend=-1))]
-        votes += normals[outermost] @ direction
-    return np.where(votes < 0, -1.0, 1.0)

@@ -37,16 +37,18 @@ distance, how far away anything matters, and the way from the line on one side t
 
 
 def scan_line_stretch(index: NeighborIndex) -> np.ndarray | None:
-    """Return the stretch (3, N) float64 at each place, 0 where points lie on no lines; None where the cloud has none.
+    """Return what `stretch_along_lines` does; None where the cloud has no lines."""
+    has_lines = len(index) >= AREA and are_lines(on_lines(index, index.sampled(SAMPLE)))
+    return stretch_along_lines(index) if has_lines else None
+
+
+def stretch_along_lines(index: NeighborIndex) -> np.ndarray:
+    """Return the stretch (3, N) float64 at each place of a cloud that has lines, 0 where points lie on none.
 
     Stretched, points of a line lie as far apart as the lines. A point takes the direction of the straightest stretch
     of line near it: where a line turns round a crease it is that of one face.
     """
-    if not _has_lines(index):
-        return None
-    lines, stretch = _lines(index, np.arange(len(index))), np.zeros((3, len(index)))
-    visit_neighbors(_choose, every_place(index), index, AROUND, lines, stretch, np.empty(0))
-    return stretch if stretch.any() else None
+    return _chosen(index, np.empty(0))
 
 
 def scan_line_normals(index: NeighborIndex, places: np.ndarray) -> np.ndarray:
@@ -65,19 +67,20 @@ def scan_line_normals(index: NeighborIndex, places: np.ndarray) -> np.ndarray:
 def stretch_reach(index: NeighborIndex) -> np.ndarray:
     """Bound how far from each place its stretch depends on other points, (N,) float64, given that the cloud has lines.
 
-    0 where it has none.
+    Infinite where there are too few points for any.
     """
-    reach = np.zeros(len(index))
-    if _has_lines(index):
-        lines, stretch = _lines(index, np.arange(len(index))), np.zeros((3, len(index)))
-        visit_neighbors(_choose, every_place(index), index, AROUND, lines, stretch, reach)
+    reach = np.full(len(index), np.inf)
+    _chosen(index, reach)
     return reach
 
 
-def _has_lines(index: NeighborIndex) -> bool:
-    if len(index) < AREA:
-        return False
-    return are_lines(on_lines(index, index.sampled(SAMPLE)))
+def _chosen(index: NeighborIndex, reach: np.ndarray) -> np.ndarray:
+    """Choose the line of each place; returns the stretch (3, N), and writes the reach unless that is empty."""
+    stretch = np.zeros((3, len(index)))
+    if len(index) >= AREA:
+        lines = _lines(index, np.arange(len(index)))
+        visit_neighbors(_choose, every_place(index), index, AROUND, lines, stretch, reach)
+    return stretch
 
 
 def are_lines(on: np.ndarray) -> bool:

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel, part
+from edgel._kernels.parallel import part, routine
 from edgel._kernels.simd import (
     LANES,
     as_floats,
@@ -117,7 +117,7 @@ def _before(x, y, z, order, found, squared, lane, i, j):
     return first_of(x, y, z, order, LANES * found[i // LANES] + i % LANES, LANES * found[j // LANES] + j % LANES)
 
 
-@kernel
+@routine
 def _settle(tree, scratch, count, k, lane):
     """Where the k-th distance equals the next one, leave only the points of smallest coordinates within the limit."""
     # Taken out of their tuples once: each time costs two atomic operations, for the count of references.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import routine
 from edgel._kernels.simd import (
     LANES,
     as_floats,
@@ -23,7 +23,7 @@ _RANKED = 64  # so few keys are ranked by counting
 _SAMPLE, _SPREAD = 32, 4  # keys of a sample, and how many of them lie between the median and either end of a window
 
 
-@kernel
+@routine
 def _ranked(keys, count, low_rank, high_rank):
     """Values at two ranks of the first `count` keys, by counting how many are smaller than each.
 
@@ -41,7 +41,7 @@ def _ranked(keys, count, low_rank, high_rank):
     return largest_of(low), largest_of(high)
 
 
-@kernel
+@routine
 def _kept(source, first, count, low, high, scratch):
     """Copy the keys from `low` on and below `high` to `scratch`; returns how many lie below `low`, how many between."""
     below, kept = 0, 0
@@ -53,7 +53,7 @@ def _kept(source, first, count, low, high, scratch):
     return below, kept
 
 
-@kernel
+@routine
 def value_at(rank, keys, first, count, scratch):
     """Value that would lie at `rank` were keys[first : first + count] sorted; `scratch` holds as many, and 8 more.
 
@@ -91,7 +91,43 @@ def value_at(rank, keys, first, count, scratch):
     return _ranked(scratch, kept, rank - below, rank - below)[0]
 
 
-@kernel
+@routine
+def select(values, count, rank):
+    """Value that would lie at `rank` were the first `count` sorted; moves it there (Hoare 1961)."""
+    low, high = 0, count - 1
+    while low < high:
+        pivot, i, j = values[(low + high) // 2], low, high
+        while i <= j:
+            while values[i] < pivot:
+                i += 1
+            while values[j] > pivot:
+                j -= 1
+            if i <= j:
+                values[i], values[j] = values[j], values[i]
+                i += 1
+                j -= 1
+        if rank <= j:
+            high = j
+        elif rank >= i:
+            low = i
+        else:
+            break
+    return values[rank]
+
+
+@routine
+def quantile(values, count, share):
+    """Value below which a share of the first `count` lie, between two of them along a line; moves them."""
+    place = (count - 1) * share
+    rank = int(place)
+    lower = select(values, count, rank)
+    upper = values[min(rank + 1, count - 1)]
+    for i in range(rank + 2, count):
+        upper = min(upper, values[i])
+    return lower * (1.0 - (place - rank)) + upper * (place - rank)
+
+
+@routine
 def sort_places(key, second, third, order, first, last):
     """Sort places first..last-1 by four arrays, the first before the second and so on (Shell 1959)."""
     gap = 1
@@ -116,7 +152,7 @@ def sort_places(key, second, third, order, first, last):
         gap //= 3
 
 
-@kernel
+@routine
 def sort_leaf(axis, xyz, order, to_xyz, to_order, first, last, ranks):
     """Sort a leaf by an axis from one pair of arrays into the other: the rank of a point is how many lie before it.
 

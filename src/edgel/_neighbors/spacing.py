@@ -12,19 +12,21 @@ from typing import Any
 import numpy as np
 
 from edgel._kernels.grid import cell_of
-from edgel._kernels.parallel import kernel, run_slices
-from edgel._neighbors.kdtree import build_index
+from edgel._kernels.parallel import kernel, routine, run_slices
+from edgel._neighbors.kdtree import NeighborIndex, build_index
 from edgel._neighbors.knn import knn
 from edgel._neighbors.queries import at_places
 from edgel.cloud import check_points
 
 DISC = 16  # nearest neighbours, the point among them, whose disc tells the area that a point stands for
+SAMPLE = 4_000  # points that the spacing of a cloud is measured at
+_OCTAVE = 0.25  # of its logarithm, to which it is rounded: no answer shall hang on which points were sampled
 _SAMPLE = 20_000  # points whose nearest neighbours are looked for
 _CELLS = 2**24  # along an axis, at most, unless there are more points
 _PER_CELL = 8  # points in a cell, so that covered area is counted well
 
 
-@kernel
+@routine
 def disc_spacing(squared):
     """Root of the area a point stands for, from the disc that its 16 nearest fill; takes their squared distances."""
     k = min(len(squared), DISC)
@@ -47,6 +49,22 @@ def median_spacing(points: Any) -> float:
     nearest = knn(index, at_places(index, index.evenly_sampled(_SAMPLE)), 2).distances[:, 1]
     nearest = nearest[nearest > 0]
     return float(np.median(nearest)) if len(nearest) else 0.0
+
+
+def cloud_spacing(index: NeighborIndex) -> float:
+    """Measure the median, over the cloud, of the root of the area that a point stands for, rounded to a fifth."""
+    return rounded_spacing(disc_radii(index, index.sampled(SAMPLE)))
+
+
+def disc_radii(index: NeighborIndex, places: np.ndarray) -> np.ndarray:
+    """Return the root (M,) of the area that the points at some places (M,), ascending, stand for."""
+    k = min(DISC, len(index))
+    return np.sqrt(np.pi * knn(index, at_places(index, places), k).distances[:, -1] ** 2 / k)
+
+
+def rounded_spacing(spacing: np.ndarray) -> float:
+    """Take the median of what `disc_radii` says of the sampled places of a cloud, in any order, rounded to a fifth."""
+    return float(2.0 ** (round(np.log2(max(float(np.median(spacing)), 1e-300)) / _OCTAVE) * _OCTAVE))
 
 
 def occupied_spacing(xyz: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> float:

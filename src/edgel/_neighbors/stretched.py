@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import kernel, routine
 from edgel._neighbors.kdtree import node_start
 from edgel._neighbors.search import first_of
 
@@ -32,7 +32,7 @@ def list_stretched(start, stop, queries, tree, places, squared):
             _nearest(tree, point, (tx, ty, tz), stack, reaches, places[q - start], squared[q - start])
 
 
-@kernel
+@routine
 def _nearest(tree, point, stretch, stack, reaches, places, squared):
     """Search the tree, the nearer child of a node first."""
     x, y, z, order, boxes, num_points = tree.x, tree.y, tree.z, tree.order, tree.boxes, len(tree.order)
@@ -72,7 +72,7 @@ def _nearest(tree, point, stretch, stack, reaches, places, squared):
             squared[slot], places[slot] = d, p
 
 
-@kernel
+@routine
 def _least(box, qx, qy, qz, ux, uy, uz, more):
     """Bound the squared stretched distance of a box from below: the least distance, and the least along the stretch."""
     dx, dy, dz = (

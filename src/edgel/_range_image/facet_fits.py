@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel, run_slices
+from edgel._kernels.parallel import kernel, routine, run_slices
 from edgel._range_image.noise import is_white, noise_level
 from edgel._range_image.rays import Rays
 
@@ -87,7 +87,9 @@ def _stretched(stretch: float) -> tuple[int, int]:
 @kernel
 def _fit(start, stop, rays, near, cell, halves, full, ray, plane):
     """Fit the windows around some rows of cells, from a table of sums of these rows and those within reach."""
-    reach = halves.max()
+    reach = 0
+    for half in halves:
+        reach = max(reach, half)
     rows, cols = ray.shape[1], ray.shape[2]
     first, last = max(start - reach, 0), min(stop + reach, rows)
     # Columns on either side repeat the table's rim, so that no window has to be cut off.
@@ -110,7 +112,7 @@ def _fit(start, stop, rays, near, cell, halves, full, ray, plane):
                     plane[s, k, i, j] = fitted[k, j]
 
 
-@kernel
+@routine
 def _sum_row(i, rays, near, cell, ray, own, table, row, reach):
     """Add a row of cells to the table; where it is the caller's own, note the mean rays."""
     height, width = near.shape
@@ -161,7 +163,7 @@ def _sum_row(i, rays, near, cell, ray, own, table, row, reach):
             table[k, row, at] = table[k, row, cols + reach]
 
 
-@kernel
+@routine
 def _regress(box, least, fitted):
     """Planes of windows from their sums: LDL^T of the normal equations, without a branch so that it runs on SIMD."""
     for j in range(box.shape[1]):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from edgel._kernels.parallel import kernel, run_slices
+from edgel._neighbors.selection import quantile
 from edgel._range_image.rays import Rays
 
 CLEAN = 0.1  # spacings: noise below which it does not matter whose it is
@@ -81,4 +82,4 @@ def _tile_levels(start, stop, left, level):
                     if left[row, col] < np.inf:
                         values[count] = left[row, col]
                         count += 1
-            level[i, j] = np.quantile(values[:count], _QUIET) if count >= _TILE else np.nan
+            level[i, j] = quantile(values, count, _QUIET) if count >= _TILE else np.nan

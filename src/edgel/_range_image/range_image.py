@@ -6,6 +6,7 @@ or onto a sphere.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -173,13 +174,23 @@ def spherical(xyz: np.ndarray, viewpoint: np.ndarray, up: np.ndarray | None = No
 
 def viewer_axes(direction: np.ndarray, up: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Right, down and forward of a viewer."""
-    length = np.linalg.norm(direction)
+    length = _length(direction)
     forward = direction / length if length > 1e-12 else np.roll(up, 1)
-    if abs(forward @ up) > 0.99 * np.linalg.norm(up):
+    if abs(forward @ up) > 0.99 * _length(up):
         up = np.roll(up, -1)
-    right = np.cross(forward, up)
-    right = right / np.linalg.norm(right)
-    return right, np.cross(forward, right), forward
+    right = _cross(forward, up)
+    right = right / _length(right)
+    return right, _cross(forward, right), forward
+
+
+def _length(vector: np.ndarray) -> float:
+    return math.sqrt(vector @ vector)
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Cross product of two vectors; NumPy's, made for many, takes many times as long for two."""
+    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
 def _rastered(

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from edgel._kernels.parallel import kernel, part, run_slices
+from edgel._neighbors.selection import quantile
 from edgel._range_image.rays import Rays
 
 CLOSE = 3.0  # spacings, and median differences of neighbours, within which a neighbour holds a pixel
@@ -84,5 +85,5 @@ def _steepness(near, row, col, lines, steps):
     steepest = np.float32(0.0)
     for way in range(2):
         if counts[way] > 0:
-            steepest = max(steepest, np.median(steps[way, : counts[way]]))
+            steepest = max(steepest, np.float32(quantile(steps[way], counts[way], 0.5)))
     return steepest

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from edgel._report.figures import draw_figures
+from edgel._report.figures import check_drawing, draw_figures
 from edgel._report.histograms import Histogram, angle_histogram, strength_histogram
 from edgel._report.page import opening, page, section
 from edgel._report.tables import Table, count_table, method_table, parameter_table, time_table
@@ -16,7 +16,7 @@ from edgel.cloud import Cloud
 from edgel.edges import Edges
 from edgel.io.files import replacing
 
-__all__ = ["Case", "Table", "file_names", "make_directory", "write_report"]
+__all__ = ["Case", "Table", "check_drawing", "file_names", "make_directory", "write_report"]
 
 PAGE = "report.html"
 
@@ -88,6 +88,7 @@ def write_report(
     """
     if not cases:
         raise ValueError("cases: expected at least one, got none")
+    check_drawing()
     folder = make_directory(directory)
     parts, taken = [opening(title, findings, tables)], set()
     for case in cases:

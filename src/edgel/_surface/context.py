@@ -10,8 +10,9 @@ import math
 
 import numpy as np
 
+from edgel._kernels.arrays import copy_to, divide_rows
 from edgel._kernels.eigen import smallest_eigenpair
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import kernel, routine
 from edgel._neighbors.neighborhood import drop_foot, relative, stretch, stretch_direction
 from edgel._neighbors.spacing import disc_spacing
 
@@ -62,11 +63,12 @@ def gather_context(first, places, squared, queries, targets, xyz, probabilities,
             features[:, row] = 0.0
             continue
         relative(places[q], queries, first + q, xyz, away)
-        away /= spacing
+        divide_rows(away, spacing)
         for i in range(k):
             j = slot[places[q, i]]
             if j >= 0:
-                near_lines[i], near_feet[i] = lines[j], feet[j]
+                copy_to(lines[j], near_lines[i])
+                copy_to(feet[j], near_feet[i])
                 if queries.shape[0] > 3:
                     stretch_direction(queries[3:, first + q], near_lines[i], 0)
                     stretch(queries[3:, first + q], near_feet[i], 0)
@@ -85,7 +87,7 @@ def gather_context(first, places, squared, queries, targets, xyz, probabilities,
             )
 
 
-@kernel
+@routine
 def _describe(places, away, spacing, probability, other, slot, lines, feet, out):
     """Describe the probabilities of one kind of edge around a point, by the lines and feet (k, 3) of its neighbours."""
     out[:] = 0.0
@@ -99,7 +101,7 @@ def _describe(places, away, spacing, probability, other, slot, lines, feet, out)
         _along_and_across_line(places, away, probability, slot, lines, feet, spacing, out)
 
 
-@kernel
+@routine
 def _main_direction(places, away, probability):
     """Direction along which the probabilities lie, and how far they lie on a line, 0 to 1."""
     xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -122,7 +124,7 @@ def _main_direction(places, away, probability):
     return x, y, z, (middle - largest) / trace
 
 
-@kernel
+@routine
 def _sums(places, probability, other, out):
     """Write the largest three of the 8 nearest, means over 8, 16 and all, and the largest of the other kind."""
     a, b, c, total, others = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -146,7 +148,7 @@ def _sums(places, probability, other, out):
     out[OTHER_OWN], out[OTHER_BEST] = other[places[0]], others
 
 
-@kernel
+@routine
 def _along_and_across(places, away, probability, tx, ty, tz, own, out):
     """Write the largest before and behind the point, and beside it, by the direction in which probabilities lie."""
     ahead, behind, beside = 0.0, 0.0, 0.0
@@ -166,7 +168,7 @@ def _along_and_across(places, away, probability, tx, ty, tz, own, out):
     out[AHEAD], out[BEHIND], out[OVER_BESIDE] = max(ahead, behind), min(ahead, behind), own - beside
 
 
-@kernel
+@routine
 def _along_and_across_line(places, away, probability, slot, lines, feet, spacing, out):
     """The same by the point's own line, and what those beside it that see the same line make of it."""
     tx, ty, tz = lines[0, 0], lines[0, 1], lines[0, 2]

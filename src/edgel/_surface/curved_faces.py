@@ -10,8 +10,9 @@ import math
 
 import numpy as np
 
+from edgel._kernels.arrays import copy_to, divide_rows, multiply
 from edgel._kernels.cholesky import explain, factorize, solve, variance_of
-from edgel._kernels.parallel import kernel, summing_kernel
+from edgel._kernels.parallel import kernel, routine, summing_routine
 from edgel._neighbors.neighborhood import relative
 from edgel._neighbors.spacing import disc_spacing
 from edgel._surface import hinge
@@ -57,50 +58,44 @@ def fit_curved_faces(first, places, squared, queries, targets, xyz, fits, max_aw
     for q in range(places.shape[0]):
         best, spacing = edges[targets[first + q]], disc_spacing(squared[q])
         if queries.shape[0] > 3:  # chosen in a stretched space, but fitted as they lie
-            spacing /= math.sqrt(1.0 + math.sqrt((queries[3:, first + q] ** 2).sum()))
+            x, y, z = queries[3, first + q], queries[4, first + q], queries[5, first + q]
+            spacing /= math.sqrt(1.0 + math.sqrt(x * x + y * y + z * z))
         if not spacing > 0.0:
             outside(fits[targets[first + q]], 1.0, best)
             continue
         relative(places[q], queries[:3], first + q, xyz, vectors)
-        vectors /= spacing
+        divide_rows(vectors, spacing)
         outside(fits[targets[first + q]], spacing, start)
-        best[:] = start
+        copy_to(start, best)
         noise, least, at, warm = 0.0, np.inf, COUNTS[0], False
         for count in COUNTS:
             near, weight = vectors[:, : min(count, k)], _WEIGHT if noise > 0.0 else 0.0
             sigma = _fit(near, best if warm else start, warm, noise, weight, max_away, min_turn, scratch, found)
             warm = found[STD] < least
             if warm:
-                best[:], least, at, noise = found, found[STD], count, noise if noise > 0.0 else sigma
+                copy_to(found, best)
+                least, at, noise = found[STD], count, noise if noise > 0.0 else sigma
         if at == COUNTS[0]:
             weight = _WEIGHT_SMALLER if noise > 0.0 else 0.0
             for count in SMALLER:
                 near = vectors[:, : min(count, k)]
                 _fit(near, start, False, noise, weight, max_away, min_turn, scratch, found)
                 if found[STD] < least:
-                    best[:], least = found, found[STD]
-        best[POSITION : POSITION + 3] *= spacing
+                    copy_to(found, best)
+                    least = found[STD]
+        multiply(best, POSITION, POSITION + 3, spacing)
         best[STD] *= spacing
 
 
-@kernel
+@routine
 def make_scratch():
     """Make the scratch buffers of a fit: faces, frames, sums, neighbours, and those of the normal equations."""
-    square = (_TERMS, _TERMS)
-    return (
-        np.empty((2, _TERMS)),
-        np.empty((2, 3)),
-        np.empty((2, _SUMS)),
-        np.empty((7, COUNTS[-1])),
-        np.empty(square),
-        np.empty(square),
-        np.empty(square),
-        np.empty(_TERMS),
-        np.empty(_TERMS),
-    )
+    square, matrices = (_TERMS, _TERMS), (np.empty((2, _TERMS)), np.empty((2, 3)), np.empty((2, _SUMS)))
+    normal = (np.empty(square), np.empty(square), np.empty(square), np.empty(_TERMS), np.empty(_TERMS))
+    return matrices + (np.empty((7, COUNTS[-1])),) + normal
 
 
-@kernel
+@routine
 def outside(fit, spacing, edge):
     """Take the edge of a hinge, both normals turned to the outside of its wedge."""
     for axis in range(3):
@@ -118,7 +113,7 @@ def outside(fit, spacing, edge):
     edge[STD] = np.nan
 
 
-@kernel
+@routine
 def _fit(vectors, start, warm, noise, weight, max_away, min_turn, scratch, edge):
     """Fit both faces to neighbours (3, K), parted by which they lie farther outside of, part again, fit again.
 
@@ -126,7 +121,8 @@ def _fit(vectors, start, warm, noise, weight, max_away, min_turn, scratch, edge)
     spacings, in which `noise` weighs as `weight` residuals. A warm start goes on with the faces of the fit before.
     """
     faces, frames, sums = scratch[0], scratch[1], scratch[2]
-    edge[:], sigma, least = start, noise, noise
+    copy_to(start, edge)
+    sigma, least = noise, noise
     if not warm:
         faces[:], sigma = 0.0, 0.0
         _frames(edge, frames)
@@ -154,7 +150,7 @@ def _fit(vectors, start, warm, noise, weight, max_away, min_turn, scratch, edge)
     return sigma
 
 
-@kernel
+@routine
 def _part(vectors, edge, band, scratch):
     """Part the neighbours by the faces (2, 6) as they are, and sum up the powers of those on either side.
 
@@ -181,7 +177,7 @@ def _part(vectors, edge, band, scratch):
     _sum_powers(other, along, other_off, second, count, sums[1])
 
 
-@kernel
+@routine
 def _project(vectors, axes, at, edge, out):
     """Coordinates along a unit vector, from the edge's position on."""
     x, y, z = axes[at], axes[at + 1], axes[at + 2]
@@ -191,7 +187,7 @@ def _project(vectors, axes, at, edge, out):
         out[i] = xs[i] * x + ys[i] * y + zs[i] * z - level
 
 
-@summing_kernel
+@summing_routine
 def _sum_powers(ts, along, heights, weights, count, sums):
     """Sum the powers of t and s up to the fourth, and those up to the second times h, and h squared."""
     n, t1, s1, t2, ts1, s2, t3, t2s, ts2, s3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -213,7 +209,7 @@ def _sum_powers(ts, along, heights, weights, count, sums):
     sums[15], sums[16], sums[17], sums[18], sums[19], sums[20], sums[21] = h1, ht, hs, ht2, hts, hs2, h2
 
 
-@kernel
+@routine
 def _fit_face(sums, sigma, model, noise, scratch, face):
     """Fit a face of so many terms, or (0) of as many as the evidence is best for, given the noise.
 
@@ -250,7 +246,7 @@ def _fit_face(sums, sigma, model, noise, scratch, face):
     return max(left, 0.0), told, variance_of(inverse, terms, 0)
 
 
-@kernel
+@routine
 def _frames(edge, frames):
     """Write the unit vectors (2, 3) across the line into either face."""
     for side in range(2):
@@ -263,7 +259,7 @@ def _frames(edge, frames):
         frames[side, 0], frames[side, 1], frames[side, 2] = sign * x, sign * y, sign * z
 
 
-@kernel
+@routine
 def _move(edge, scratch, max_away, min_turn):
     """Put the edge where the faces meet abreast of the point, their tangent planes there; what is left is curvature.
 
@@ -275,7 +271,8 @@ def _move(edge, scratch, max_away, min_turn):
         for axis in range(3):
             edge[n + axis] -= faces[side, 1] * frames[side, axis] + faces[side, 2] * edge[LINE + axis]
         length = math.sqrt(_dot(edge, n, edge, n))
-        edge[n : n + 3] /= length
+        for axis in range(3):
+            edge[n + axis] /= length
         faces[side, 0] /= length
     cosine = _dot(edge, FIRST, edge, SECOND)
     if not (abs(cosine) < 1.0 - 1e-9 and math.acos(cosine) > min_turn):
@@ -283,7 +280,10 @@ def _move(edge, scratch, max_away, min_turn):
     sine2 = 1.0 - cosine * cosine
     a, b = (faces[0, 0] - cosine * faces[1, 0]) / sine2, (faces[1, 0] - cosine * faces[0, 0]) / sine2
     faces[:, :3] = 0.0
-    edge[LINE : LINE + 3] = np.cross(edge[FIRST : FIRST + 3], edge[SECOND : SECOND + 3]) / math.sqrt(sine2)
+    sine = math.sqrt(sine2)
+    edge[LINE] = (edge[FIRST + 1] * edge[SECOND + 2] - edge[FIRST + 2] * edge[SECOND + 1]) / sine
+    edge[LINE + 1] = (edge[FIRST + 2] * edge[SECOND] - edge[FIRST] * edge[SECOND + 2]) / sine
+    edge[LINE + 2] = (edge[FIRST] * edge[SECOND + 1] - edge[FIRST + 1] * edge[SECOND]) / sine
     for axis in range(3):
         edge[POSITION + axis] += a * edge[FIRST + axis] + b * edge[SECOND + axis]
     along = _dot(edge, POSITION, edge, LINE)
@@ -295,6 +295,6 @@ def _move(edge, scratch, max_away, min_turn):
     return math.sqrt(a * a + b * b + 2.0 * a * b * cosine)
 
 
-@kernel
+@routine
 def _dot(a, i, b, j):
     return a[i] * b[j] + a[i + 1] * b[j + 1] + a[i + 2] * b[j + 2]

@@ -11,7 +11,7 @@ from typing import IO, NamedTuple
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel, run_slices
+from edgel._kernels.parallel import kernel, routine, run_slices
 from edgel._kernels.simd import LANES
 from edgel._surface.features import LEAF, POINT
 
@@ -123,7 +123,7 @@ def _evaluate(start, stop, features, trees, result):
             result[first + row] = logistic(totals[row])
 
 
-@kernel
+@routine
 def add_up(rows, trees, totals):
     """Write what trees say of each of some rows, `IN_STEP` at most, into `totals` (IN_STEP,).
 
@@ -149,7 +149,7 @@ def add_up(rows, trees, totals):
                 totals[first + lane] += threshold[nodes[np.uint64(lane)]]
 
 
-@kernel
+@routine
 def logistic(total):
     """Return the probability of what trees sum up to: they are trained for its logit."""
     return 1.0 / (1.0 + math.exp(-total))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel
+from edgel._kernels.arrays import copy_rows, copy_to
+from edgel._kernels.parallel import kernel, routine
 from edgel._kernels.rows import aligned
 from edgel._kernels.simd import LANES
 from edgel._neighbors.neighborhood import relative, stretch_normal, unstretch_normal
@@ -36,7 +37,8 @@ def screen(
     cheap = plane_scales.NUM_FEATURES
     vectors, fitted, found = np.empty((3, places.shape[1])), np.zeros((len(scales), 4)), np.zeros(cheap)
     features, totals = np.zeros((IN_STEP, cheap + len(cloud)), np.float32), np.empty(IN_STEP)
-    features[:, cheap:] = cloud
+    for i in range(IN_STEP):
+        copy_to(cloud, features[i, cheap:])
     for begin in range(0, places.shape[0], IN_STEP):
         count = min(IN_STEP, places.shape[0] - begin)
         for i in range(count):
@@ -46,8 +48,8 @@ def screen(
             if queries.shape[0] > 3:
                 for s in range(len(scales)):
                     unstretch_normal(queries[3:, first + q], fitted[s], 0)
-            normals[targets[first + q]] = fitted
-            features[i, :cheap] = found
+            copy_rows(fitted, normals[targets[first + q]])
+            copy_to(found, features[i])
         add_up(features[:count], trees, totals)
         for i in range(count):
             probability[targets[first + begin + i]] = logistic(totals[i])
@@ -77,24 +79,24 @@ def gather_evidence(
         relative(places[q], queries, first + q, xyz, vectors)
         spacing = disc_spacing(squared[q])
         fit_scales(vectors, squared[q], scales, fitted, found)
-        features[:cheap] = found
+        copy_to(found, features)
         at = cheap
-        features[at : at + len(cloud)] = cloud
+        copy_to(cloud, features[at:])
         at += len(cloud) + len(fits) * two_planes.NUM_FEATURES
         span_planes(vectors, max(spacing, 1e-300), spanned, off)
         for j in range(len(votes)):
             planes_through(vectors, int(votes[j, 0]), spacing, votes[j, 1], cos_min, spanned, off, score, of_votes)
-            features[at : at + len(of_votes)] = of_votes
+            copy_to(of_votes, features[at:])
             at += len(of_votes)
-        frames[:] = normals[own]
+        copy_rows(normals[own], frames)
         if queries.shape[0] > 3:
             for s in range(len(scales)):
                 stretch_normal(queries[3:, first + q], frames[s], 0)
         sector_gaps(vectors, squared[q], frames, counts, angles, begins, ends, gaps)
-        features[at : at + len(gaps)] = gaps
+        copy_to(gaps, features[at:])
 
 
-@kernel
+@routine
 def _fit_all(first, places, squared, queries, targets, xyz, normals, fits, begin, out, planes):
     """Fit two planes at each scale, to eight points in step: features into the columns of `out` from `begin` on."""
     num, k = places.shape
@@ -107,12 +109,13 @@ def _fit_all(first, places, squared, queries, targets, xyz, normals, fits, begin
             own[lane] = min(q + lane, num - 1)  # the last one stands in for those that are missing
             spacings[lane] = disc_spacing(squared[own[lane]])
             relative(places[own[lane]], queries, first + own[lane], xyz, away)
-            vectors[:, lane::LANES] = away
+            for axis in range(3):
+                copy_to(away[axis], vectors[axis, lane::LANES])
         for f in range(len(fits)):
             count, scale = min(fits[f, 0], k), fits[f, 1]
             for lane in range(LANES):
                 for i in range(count):
-                    plane[:] = normals[places[own[lane], i], scale]
+                    copy_to(normals[places[own[lane], i], scale], plane)
                     if stretched:
                         stretch_normal(queries[3:, first + own[lane]], plane, 0)
                     for axis in range(4):
@@ -120,7 +123,7 @@ def _fit_all(first, places, squared, queries, targets, xyz, normals, fits, begin
             fit_two_planes(vectors, around, count, spacings, scratch, features, hinges)
             for lane in range(min(LANES, num - q)):
                 row, at = targets[first + q + lane], begin + f * two_planes.NUM_FEATURES
-                out[row, at : at + two_planes.NUM_FEATURES] = features[lane::LANES]
-                planes[row, f] = hinges[lane::LANES]
+                copy_to(features[lane::LANES], out[row, at:])
+                copy_to(hinges[lane::LANES], planes[row, f])
                 if stretched:
                     unstretch_hinge(queries[3:, first + q + lane], planes[row, f])

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from edgel._kernels.moments import add_moments_of_eight, planes_of_moments
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import routine
 from edgel._kernels.rows import keep_rows, load_row, load_three, store_row, store_rows
 from edgel._kernels.simd import LANES, bits, root, spread, where
 from edgel._neighbors.neighborhood import drop_foot, unstretch, unstretch_direction, unstretch_normal
@@ -22,7 +22,7 @@ PARTING, PARTING_LEVEL = 20, 23
 HINGE = 24
 
 
-@kernel
+@routine
 def bisect(a, b, line):
     """Find where planes a and b (6 rows) meet, and the plane that parts their centroids.
 
@@ -54,7 +54,7 @@ def bisect(a, b, line):
     store_rows(line, 0, (tx * length, ty * length, tz * length, fx, fy, fz, px, py, pz, level))
 
 
-@kernel
+@routine
 def refine(vectors, count, whole, start, scratch, hinge, best):
     """Part the neighbours by the plane `start` (4 rows), fit, part again; `best` (1 row) takes the squares left.
 
@@ -91,7 +91,7 @@ def refine(vectors, count, whole, start, scratch, hinge, best):
             break
 
 
-@kernel
+@routine
 def unstretch_hinge(own, fit):
     """Take a hinge (24,) back from the space that the stretch `own` (3,) makes."""
     for normal in (FIRST_NORMAL, SECOND_NORMAL):

@@ -72,7 +72,10 @@ def strengths(index: NeighborIndex, points: np.ndarray, probability: np.ndarray)
     even = even_probability(histogram(probability))
     if even >= SURE:
         return strength_of(probability, even)
-    faint = faint_points(index, points, probability, even)
+    likely, row = np.flatnonzero(probability >= even), np.full(len(index), -1)
+    row[points] = np.arange(len(points))
+    nearest = row[knn(index, at_points(index, points[likely]), min(NEAREST, len(index))).points]
+    faint = faint_points(probability, even, likely, nearest)
     number, chained = np.full(len(probability), -1), np.empty(len(faint.rows), np.bool_)
     number[faint.rows] = np.arange(len(faint.rows))
     links = np.where(faint.links >= 0, number[faint.links], -1)
@@ -92,11 +95,20 @@ def even_probability(counts: np.ndarray) -> float:
     none of them sure. Where it would be lower than that there are no edges to speak of, and what is found has to be as
     sure as elsewhere. Takes the `histogram` of all probabilities.
     """
-    falling = counts[::-1]
-    hits = np.cumsum(falling * ((np.arange(BINS)[::-1] + 0.5) / BINS))
-    expected = hits / np.maximum(np.cumsum(falling) + hits[-1], 1e-300)
+    bins = np.flatnonzero(counts)[::-1]
+    hits = np.cumsum(counts[bins] * ((bins + 0.5) / BINS))
+    expected = hits / (np.cumsum(counts[bins]) + hits[-1:])
     even = round(float(expected.max(initial=0.0)) / _STEP) * _STEP
     return min(even, EVEN[1]) if even >= EVEN[0] else SURE
+
+
+def least_probability(min_strength: float) -> float:
+    """Return the least probability of a point that may be asked for, wherever the line is drawn.
+
+    Points below it have less strength, belong to no chain, and tell nobody where the surface ends.
+    """
+    least = EVEN[0] * min_strength / (EVEN[0] * min_strength + (1 - EVEN[0]) * (1 - min_strength))
+    return min(EVEN[0], least * (1 - 1e-9))
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,31 +121,24 @@ class Faint:
         Among the points with a probability, ascending.
     links : (K, 9) int64
         The rows of the nearest points of each, itself first; -1 where that is not as likely.
-    nearest : (K, 9) int64
-        The nearest points.
     likeliest : (K,) bool
         Whether none of them is likelier.
     """
 
     rows: np.ndarray
     links: np.ndarray
-    nearest: np.ndarray
     likeliest: np.ndarray
 
 
-def faint_points(
-    index: NeighborIndex, points: np.ndarray, probability: np.ndarray, even: float, own: np.ndarray | None = None
-) -> Faint:
-    """Look at the nearest of those points (M,), ascending, whose probability (M,) is at least `even`.
+def faint_points(probability: np.ndarray, even: float, on: np.ndarray, nearest: np.ndarray) -> Faint:
+    """Look at those of some rows `on` (K,), ascending, whose probability (M,) is at least `even`.
 
-    Only at those of some rows `own` (K,), ascending, where these are given.
+    `nearest` (K, 9) are the rows of the nearest points of each, itself first; -1 where one has no probability.
     """
-    likely = probability >= even
-    on = np.flatnonzero(likely) if own is None else own[likely[own]]
-    nearest = knn(index, at_points(index, points[on]), min(NEAREST, len(index))).points
-    everywhere, row = np.zeros(len(index)), np.full(len(index), -1)
-    everywhere[points], row[points[likely]] = probability, np.flatnonzero(likely)
-    return Faint(on, row[nearest], nearest, probability[on] >= everywhere[nearest].max(axis=1))
+    likely = probability[on] >= even
+    on, nearest = on[likely], nearest[likely]
+    beside = np.where(nearest >= 0, probability[nearest], 0.0)
+    return Faint(on, np.where(beside >= even, nearest, -1), probability[on] >= beside.max(axis=1, initial=0.0))
 
 
 def with_faint(probability: np.ndarray, even: float, faint: Faint, chained: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import routine
 
 SPANNING = 10  # nearest ones that span planes
 PLANES = SPANNING * (SPANNING - 1) // 2
@@ -29,7 +29,7 @@ _ASIDE = 0.4  # nearer to the line, in spacings, an inlier lies on no side of it
 _FLAT = 0.3  # neighbours in line with the point, area below this many spacings squared, span no plane
 
 
-@kernel
+@routine
 def span_planes(vectors, spacing, planes, off):
     """Span planes (3, PLANES) float32 by the point with two neighbours, and measure how far off the others lie.
 
@@ -57,7 +57,7 @@ def span_planes(vectors, spacing, planes, off):
             row[p] = abs(x * nx[p] + y * ny[p] + z * nz[p])
 
 
-@kernel
+@routine
 def planes_through(vectors, count, spacing, inlier, cos_min, planes, off, score, features):
     """Describe the two best planes through a point that differ by the least angle or more.
 
@@ -87,7 +87,7 @@ def planes_through(vectors, count, spacing, inlier, cos_min, planes, off, score,
     features[SECOND_BALANCE] = _balance(vectors, count, inlier, spacing, nb, off[:, b], lx, ly, lz)
 
 
-@kernel
+@routine
 def _best_plane(count, inlier, cos_min, planes, off, other, score):
     """Return which plane is best supported, -1 for none; `score` (PLANES,) becomes the support of each.
 
@@ -110,7 +110,7 @@ def _best_plane(count, inlier, cos_min, planes, off, other, score):
     return best
 
 
-@kernel
+@routine
 def _balance(vectors, count, inlier, spacing, plane, off, lx, ly, lz):
     """Of a plane's inliers beside a line in it: those on the emptier side over those on the fuller."""
     tx, ty, tz = plane[1] * lz - plane[2] * ly, plane[2] * lx - plane[0] * lz, plane[0] * ly - plane[1] * lx

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
+from edgel._kernels.arrays import copy_to
 from edgel._kernels.eigen import smallest_eigenpair
 from edgel._kernels.moments import add_moments
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import kernel, routine
 from edgel._neighbors.neighborhood import relative
 from edgel._neighbors.spacing import disc_spacing
 
@@ -31,7 +32,7 @@ NUM_FEATURES = len(SCALES) * len(OF_SCALE) + len(OF_POINT)
 _PER_SCALE = len(OF_SCALE)
 
 
-@kernel
+@routine
 def fit_scales(vectors, squared, scales, normals, features):
     """Fit planes to the first neighbours (3, k) of a point, relative to it, at each scale.
 
@@ -79,5 +80,5 @@ def describe(first, places, squared, queries, targets, xyz, scales, features, sp
     for q in range(places.shape[0]):
         relative(places[q], queries, first + q, xyz, vectors)
         fit_scales(vectors, squared[q], scales, fitted, found)
-        features[targets[first + q]] = found
+        copy_to(found, features[targets[first + q]])
         spacing[targets[first + q]] = disc_spacing(squared[q])

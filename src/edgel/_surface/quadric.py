@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from edgel._kernels.frames import tangents_of_eight
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import routine
 from edgel._kernels.rows import load_row, load_three, store_row, store_rows
 from edgel._kernels.simd import larger, multiply_add, root, spread
 
 _STIFF = 1e-4  # on the diagonal, so that what the neighbours leave open is small
 
 
-@kernel
+@routine
 def _add_powers(vectors, count, plane, scale, sums):
     """Sum the powers of x and y up to the fourth over the tangent plane, those times z, and z squared, in radii.
 
@@ -56,7 +56,7 @@ _POWER = np.array(  # which power of `_add_powers` a product of two of the terms
 )
 
 
-@kernel
+@routine
 def fit_quadric(vectors, count, plane, scale, scratch, bent):
     """Fit z = f0 + f1 x + f2 y + f3 x^2 + f4 x y + f5 y^2 over the tangent plane, by Cholesky of the normal equations.
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from edgel._kernels.parallel import kernel
@@ -39,7 +41,7 @@ def evidence_reach(
         visit_neighbors(_mark, at_places(index, asked[-1], stretch=stretch), index, k, near)
         asked.append(np.flatnonzero(near))
     for count, some in zip(reversed(_CHAIN), reversed(asked), strict=True):
-        visit = _or_radius if count == SCALES[-1] else _and_farthest
+        visit = _or_radius if count == SCALES[-1] else and_farthest
         result = np.zeros(len(index))
         queries = at_places(index, some, some, stretch)  # no point lies farther than it does stretched
         visit_neighbors(visit, queries, index, min(count, len(index)), farthest, of_stretch, result)
@@ -47,28 +49,78 @@ def evidence_reach(
     return farthest[places]
 
 
-def settled(index: NeighborIndex, leaves: Leaves, depth: np.ndarray, asked: np.ndarray) -> np.ndarray:
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """Bounds on how far the points of each leaf reach, by the centroids of the leaves alone.
+
+    Attributes
+    ----------
+    leaf : (N,) int32
+        Of each place.
+    radii : (4, L) float64
+        Around any point of a leaf, within which its nearest of each number in `_CHAIN` lie; last, the radius within
+        which the first look at it depends on others.
+    """
+
+    leaf: np.ndarray
+    radii: np.ndarray
+
+    @staticmethod
+    def of(index: NeighborIndex, leaves: Leaves) -> Bounds:
+        """Measure at the centroids; infinite where there are fewer points than are asked for."""
+        leaf, begins = leaves.octree.leaf_of_places(), leaves.octree.starts[:-1]
+        radii = np.full((len(_CHAIN) + 1, len(begins)), np.inf)
+        if len(index) >= max(_CHAIN):
+            visit_neighbors(_at_centres, anywhere(leaves.centroids), index, max(_CHAIN), np.array(_CHAIN), radii)
+        radii[-1] = leaves.radii + leaves.radii[leaves.nearest].max(axis=1)
+        # No point of a leaf reaches farther than its centroid does, and it lies from that.
+        radii += np.maximum.reduceat(_off_centre(index, leaves, leaf)[leaves.octree.places], begins)
+        return Bounds(leaf, radii)
+
+
+def with_context_of(
+    index: NeighborIndex, bounds: Bounds, asked: np.ndarray, depth: np.ndarray, stretch: np.ndarray | None = None
+) -> np.ndarray:
+    """Return some places, `asked` (N,) bool, and those whose evidence is among the context of one of them, (N,) bool.
+
+    `depth` (N,) is how deep each lies in a region of which all places are asked for: most need not be looked at. Takes
+    the stretch (3, N) on scan lines, where there is one: then all are.
+    """
+    near = asked.copy()
+    outer = asked if stretch is not None else asked & (bounds.radii[0][bounds.leaf] >= depth)
+    places = np.flatnonzero(outer)
+    if len(places):
+        queries = at_places(index, places, stretch=stretch)
+        visit_neighbors(_mark, queries, index, min(_CHAIN[0], len(index)), near)
+    return near
+
+
+def settled(
+    index: NeighborIndex,
+    leaves: Leaves,
+    bounds: Bounds,
+    depth: np.ndarray,
+    asked: np.ndarray,
+    stretch: np.ndarray | None = None,
+) -> np.ndarray:
     """Say at which of some places, `asked` (N,) bool, nothing can change that lies farther away than a depth (N,).
 
-    Most are told by a bound on how far all around reach; the others are looked at one by one (`evidence_reach`).
+    Most are told by a bound on how far all around reach; the others, and all on scan lines, are looked at one by one
+    (`evidence_reach`).
     """
-    sure = asked & (_bound(index, leaves) < depth)
+    sure = asked & (_farthest(index, bounds) < depth if stretch is None else False)
     places = np.flatnonzero(asked & ~sure)
     if len(places):
-        sure[places] = evidence_reach(index, leaves, places) < depth[places]
+        sure[places] = evidence_reach(index, leaves, places, stretch) < depth[places]
     return sure
 
 
-def _bound(index: NeighborIndex, leaves: Leaves) -> np.ndarray:
+def _farthest(index: NeighborIndex, bounds: Bounds) -> np.ndarray:
     """Bound `evidence_reach` at all places, (N,) float64, by the farthest that leaves around reach, seen from above."""
-    leaf, begins = leaves.octree.leaf_of_places(), leaves.octree.starts[:-1]
-    if len(index) < max(_CHAIN):
+    leaf, radii = bounds.leaf, bounds.radii[:-1].copy()
+    radii[-1] = np.maximum(radii[-1], bounds.radii[-1])
+    if not np.isfinite(radii).all():
         return np.full(len(index), np.inf)
-    radii = np.empty((len(_CHAIN), len(begins)))
-    visit_neighbors(_at_centres, anywhere(leaves.centroids), index, max(_CHAIN), np.array(_CHAIN), radii)
-    radii[-1] = np.maximum(radii[-1], leaves.radii + leaves.radii[leaves.nearest].max(axis=1))
-    # No point of a leaf reaches farther than its centroid does, and it lies from that.
-    radii += np.maximum.reduceat(_off_centre(index, leaves, leaf)[leaves.octree.places], begins)
     usual = _USUAL * np.median(radii[:-1], axis=1)
     plan = index.xyz[:2] - index.xyz[:2].min(axis=1, keepdims=True)
     size = max(float(usual[0]) / 2, float(np.sqrt(np.prod(np.ptp(plan, axis=1)) / len(index))))
@@ -134,7 +186,8 @@ def _or_radius(first, places, squared, queries, targets, xyz, own, least, result
 
 
 @kernel
-def _and_farthest(first, places, squared, queries, targets, xyz, theirs, least, result):
+def and_farthest(first, places, squared, queries, targets, xyz, theirs, least, result):
+    """Write how far away the farthest neighbour lies, or what is the least, and what is the most of `theirs` (N,)."""
     for q in range(places.shape[0]):
         row, farthest = targets[first + q], 0.0
         for i in range(places.shape[1]):

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
+from edgel._kernels.arrays import copy_to, divide_rows, multiply
 from edgel._kernels.cholesky import explain, factorize, solve, variance_of
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import kernel, routine
 from edgel._neighbors.kdtree import NeighborIndex, build_index
 from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.neighborhood import relative
@@ -18,6 +19,7 @@ AROUND = 16  # neighbours whose middle says on which side the surface lies
 COUNTS = (7, 17)  # outermost points of each fit; that which is surest of its position is taken
 POSITION, LINE, STD = 0, 3, 6
 RIM = 7
+OUTWARD = 5  # columns of `find_outward`
 
 _TERMS = 3  # 1, s along the rim, s^2 / 2
 _CURVATURE = 0.3  # of a rim, in 1 / spacing: standard deviation of what is expected of all
@@ -28,22 +30,43 @@ _DEPTH = 1.25  # of outermost points inside the true end, over their spread: mea
 _ASIDE = 2.0  # spacings from the line: farther ones belong to another rim
 
 
-def find_rims(
-    index: NeighborIndex, points: np.ndarray, outermost: np.ndarray, normals: np.ndarray, noise: np.ndarray
-) -> np.ndarray:
-    """Fit a line with a bend to the outermost points around some.
+def find_outward(index: NeighborIndex, points: np.ndarray, normals: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    """Say on which side of some points the surface ends.
 
     Parameters
     ----------
     index : NeighborIndex
     points : (M,) int64
         Ascending.
+    normals : (M, 3) float64
+        Of the surface there, of either sign.
+    noise : (M,) float64
+        Standard deviation of the points off it, in the cloud's unit.
+
+    Returns
+    -------
+    (M, 5) float64
+        The unit vector along the surface away from it (NaN where there is none), the spacing, and the noise in it.
+    """
+    across = np.full((len(points), OUTWARD), np.nan)
+    if len(points):
+        k = min(AROUND, len(index))
+        visit_neighbors(_find_across, at_points(index, points), index, k, normals, noise, across)
+    return across
+
+
+def fit_rims(xyz: np.ndarray, outermost: np.ndarray, normals: np.ndarray, across: np.ndarray) -> np.ndarray:
+    """Fit a line with a bend to the outermost points around some.
+
+    Parameters
+    ----------
+    xyz : (M, 3) float64
     outermost : (K, 3) float64
         The points that surely are where the surface ends.
     normals : (M, 3) float64
         Of the surface there.
-    noise : (M,) float64
-        Standard deviation of the points off it, in the cloud's unit.
+    across : (M, 5) float64
+        See `find_outward`.
 
     Returns
     -------
@@ -51,13 +74,10 @@ def find_rims(
         Place on the rim relative to the point, unit tangent, and the standard deviation of the place across the
         tangent; NaN where there are too few points, or no normal.
     """
-    rims, across = np.full((len(points), RIM), np.nan), np.full((len(points), 5), np.nan)
-    if len(points) and len(outermost) >= COUNTS[0]:
-        k = min(AROUND, len(index))
-        visit_neighbors(_find_across, at_points(index, points), index, k, normals, noise, across)
-        alone, queries = build_index(outermost), anywhere(index.at(index.places_of(points)))
+    rims = np.full((len(xyz), RIM), np.nan)
+    if len(xyz) and len(outermost) >= COUNTS[0]:
         k = min(COUNTS[-1], len(outermost))
-        visit_neighbors(_fit_rims, queries, alone, k, normals, across, rims)
+        visit_neighbors(_fit_rims, anywhere(xyz), build_index(outermost), k, normals, across, rims)
     return rims
 
 
@@ -70,7 +90,10 @@ def _find_across(first, places, squared, queries, targets, xyz, normals, noise, 
         relative(places[q], queries, first + q, xyz, vectors)
         normal, out = normals[row], across[row]
         for axis in range(3):
-            out[axis] = -vectors[axis].mean()
+            total = 0.0
+            for i in range(vectors.shape[1]):
+                total += vectors[axis, i]
+            out[axis] = -total / vectors.shape[1]
         height = out[0] * normal[0] + out[1] * normal[1] + out[2] * normal[2]
         for axis in range(3):
             out[axis] -= height * normal[axis]
@@ -78,7 +101,8 @@ def _find_across(first, places, squared, queries, targets, xyz, normals, noise, 
         out[3] = disc_spacing(squared[q])
         out[4] = noise[row] / out[3] if out[3] > 0.0 else 0.0
         if length > 1e-6 * out[3]:
-            out[:3] /= length
+            for axis in range(3):
+                out[axis] /= length
         else:
             out[:3] = np.nan
 
@@ -94,18 +118,19 @@ def _fit_rims(first, places, squared, queries, targets, xyz, normals, across, ri
         if not (spacing > 0.0 and math.isfinite(across[row, 0]) and math.isfinite(normals[row, 0])):
             continue
         relative(places[q], queries, first + q, xyz, vectors)
-        vectors /= spacing
+        divide_rows(vectors, spacing)
         least = np.inf
         for count in COUNTS:
             if count > places.shape[1]:
                 break
             if _fit(vectors[:, :count], normals[row], across[row], scratch, found) and found[STD] < least:
-                best[:], least = found, found[STD]
-        best[POSITION : POSITION + 3] *= spacing
+                copy_to(found, best)
+                least = found[STD]
+        multiply(best, POSITION, POSITION + 3, spacing)
         best[STD] *= spacing
 
 
-@kernel
+@routine
 def _fit(vectors, normal, outward, scratch, rim):
     """Fit a line to points (3, K), in spacings, straight at first, then bent, each along the one before."""
     matrix, lower, inverse, right, along, line = scratch

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from edgel._kernels.frames import tangents
-from edgel._kernels.parallel import kernel, summing_kernel
+from edgel._kernels.parallel import routine, summing_routine
 
 COUNTS = (16, 32, 96)
 
@@ -22,7 +22,7 @@ BINS = 64
 """Sectors the angles are sorted into: empty ones narrower than this share of the circle are of no interest."""
 
 
-@kernel
+@routine
 def sector_gaps(vectors, squared, normals, counts, angles, first, last, features):
     """Write the widest empty sector of the tangent plane and the second widest, for each number of neighbours.
 
@@ -60,7 +60,7 @@ def sector_gaps(vectors, squared, normals, counts, angles, first, last, features
         features[_PER_COUNT * s + SECOND] = second
 
 
-@summing_kernel
+@summing_routine
 def _angles(vectors, count, ux, uy, uz, vx, vy, vz, angles):
     """Angle of neighbours in a plane, right to 2e-8 rad, by SIMD; a tenth of the time of the library's.
 
@@ -83,7 +83,7 @@ def _angles(vectors, count, ux, uy, uz, vx, vy, vz, angles):
         angles[i] = -angle if y < 0.0 else angle
 
 
-@kernel
+@routine
 def _with_gap(gap, widest, second):
     """Return the two widest of three gaps."""
     if gap > widest:

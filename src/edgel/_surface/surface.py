@@ -8,17 +8,16 @@ import numpy as np
 
 from edgel._faces import Faces
 from edgel._neighbors.kdtree import NeighborIndex, build_index
-from edgel._neighbors.normals import fit_nearest, towards
-from edgel._neighbors.queries import at_points
 from edgel._neighbors.scan_lines import scan_line_stretch
+from edgel._neighbors.spacing import cloud_spacing
 from edgel._stages import Stages
 from edgel._surface.classify import Classification, classify
 from edgel._surface.coarser import CELL, FAINT, FEWEST, Carried, apart, carry, means_of_cells
-from edgel._surface.faces import localize
+from edgel._surface.faces import fit_locally
 from edgel._surface.line import Strengths, strengths
 from edgel._surface.plane_scales import SCALES
 from edgel._surface.screen import Screening, screen
-from edgel._surface.smoothing import cloud_spacing, smoothed
+from edgel._surface.smoothing import smoothed
 from edgel._surface.statistics import cloud_statistics
 from edgel.edges import OUTLINES, EdgeKind
 
@@ -79,6 +78,13 @@ class Surface:
         with self._stages("classification"):
             return classify(index, screening)
 
+    def probabilities(self) -> np.ndarray:
+        """How likely a crease and an outline are at every point, (N, 2), by the most that the detector asks of it."""
+        index, screening, every = self.smoothed, self.screening, np.zeros((2, len(self.xyz)))
+        with self._stages("classification"):
+            classify(index, screening, every=every)
+        return every.T
+
     @cached_property
     def _own_strengths(self) -> Strengths:
         """How marked the edges are by their own neighbours."""
@@ -122,9 +128,11 @@ class Surface:
 
         Normals are turned towards the viewpoint, or upwards (+Z) without one.
         """
+        of_cloud = (self.index, self.smoothed, self.stretch, self.classified)
+        creases, ends = (kind & EdgeKind.CREASE) > 0, (kind & OUTLINES) > 0
+        fits = fit_locally(*of_cloud, edge, creases, ends, num_neighbors, viewpoint)
         outermost = self.xyz[self.classified.points[self.classified.outline > SURE]]
-        of_cloud = (self.index, self.smoothed, self.stretch, self.classified, outermost)
-        faces = locate(*of_cloud, edge, kind, num_neighbors, viewpoint)
+        faces = fits.faces(kind, outermost, viewpoint)
         self._put_carried(faces, edge, num_neighbors, viewpoint)
         return faces
 
@@ -138,23 +146,3 @@ class Surface:
         kinds = coarser.strengths.take(np.searchsorted(coarser.strengths.points, asked)).kinds(FAINT)
         found = coarser.faces(asked, kinds, num_neighbors, viewpoint)
         faces.put(rows, found.along(self.xyz[edge[rows]], of_source), slice(None))
-
-
-def locate(
-    index: NeighborIndex,
-    smoothed: NeighborIndex,
-    stretch: np.ndarray | None,
-    classified: Classification,
-    outermost: np.ndarray,
-    edge: np.ndarray,
-    kind: np.ndarray,
-    num_neighbors: int,
-    viewpoint: np.ndarray | None,
-) -> Faces:
-    """Say what `Surface.faces` does, of a cloud or a part of it; the surface ends at `outermost` (K, 3)."""
-    own = stretch if stretch is None else stretch[:, smoothed.places_of(index.order)]
-    planes = fit_nearest(index, at_points(index, edge, own), num_neighbors)
-    planes = towards(planes, index.at(index.places_of(edge)), viewpoint)
-    creases = classified.take(np.isin(classified.points, edge[(kind & EdgeKind.CREASE) > 0]))
-    ends = (kind & OUTLINES) > 0
-    return localize(index, smoothed, edge, planes, num_neighbors, creases, ends, outermost, viewpoint, stretch)

@@ -11,7 +11,7 @@ import numpy as np
 
 from edgel._kernels.frames import tangents_of_eight
 from edgel._kernels.moments import add_moments_of_eight, planes_of_moments
-from edgel._kernels.parallel import kernel, part
+from edgel._kernels.parallel import part, routine
 from edgel._kernels.rows import aligned, keep_rows, load_row, load_three, store_row, store_rows
 from edgel._kernels.simd import LANES, larger, magnitude, root, smaller, spread, where
 from edgel._surface.hinge import (
@@ -53,13 +53,13 @@ NUM_FEATURES = len(FEATURES)
 _MARGIN_NEIGHBORS = 16
 
 
-@kernel
+@routine
 def make_scratch():
     """Make the scratch buffers of `fit_two_planes`: (16, 42 rows)."""
     return aligned(16 * 42 * LANES).reshape(16, -1)
 
 
-@kernel
+@routine
 def _measure(vectors, count, spacings, scale):
     """Write radius, spacing, and whether both are above 0, 1 where not, to `scale` (3 rows)."""
     x, y, z = load_row(vectors[0], count - 1), load_row(vectors[1], count - 1), load_row(vectors[2], count - 1)
@@ -70,7 +70,7 @@ def _measure(vectors, count, spacings, scale):
     )
 
 
-@kernel
+@routine
 def _across_bend(plane, quadric, whole, start):
     """Put the plane through the point across the direction in which the quadric bends most into `start`.
 
@@ -100,7 +100,7 @@ def _nearness(far2):
     return 1.0 / (1.0 + far2 * (1.0 + 0.5 * far2 * (1.0 + far2 * (1.0 / 3.0))))
 
 
-@kernel
+@routine
 def _most_different(vectors, normals, count, scale, a, b):
     """Choose the planes of the two neighbours whose planes differ most, near and flat ones first.
 
@@ -176,7 +176,7 @@ def _margin(vectors, count, spacing, hinge):
     return margin
 
 
-@kernel
+@routine
 def _describe(vectors, count, scale, plane, bent, two, hinge, features):
     """Write what `fit_two_planes` says of the fits, before logarithms are taken; erase the hinges that are none."""
     radius, spacing, scattered = load_three(scale, 0)
@@ -203,7 +203,7 @@ def _describe(vectors, count, scale, plane, bent, two, hinge, features):
     store_rows(features, MARGIN, (where(away < 3.0, margin, 2.0), where(found, 1.0, spread(0.0))))
 
 
-@kernel
+@routine
 def _take_logarithms(features, scale):
     """Finish what `_describe` wrote lane by lane: there are no logarithms and no arccos in step."""
     for lane in range(LANES):
@@ -215,7 +215,7 @@ def _take_logarithms(features, scale):
             features[i * LANES + lane] *= scale[2 * LANES + lane]
 
 
-@kernel
+@routine
 def fit_two_planes(vectors, normals, count, spacings, scratch, features, hinges):
     """Fit two planes to the `count` nearest neighbours of eight points, and describe how well that explains them.
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import kernel, routine
 from edgel.curves._smooth import Smoothed
 
 _STEP = 0.25  # spacings: a chain steps at least so far
@@ -101,7 +101,7 @@ def _walk(order, position, tangent, spacing, kind, neighbors, points, start, clo
     return chains
 
 
-@kernel
+@routine
 def _next(here, seed, length, dx, dy, dz, position, tangent, spacing, kind, neighbors, used):
     """Return the point that follows, whether that is the seed, how far it is, and the direction there; -1 for none."""
     h = spacing[here]

@@ -6,7 +6,7 @@ import math
 
 from edgel._kernels.eigen import smallest_eigenpair
 from edgel._kernels.frames import tangents
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import routine
 
 SHAPE = 13
 """Numbers of a shape: its origin (a line's middle, a circle's centre), three axes, and the radius, 0 of a line. The
@@ -15,7 +15,7 @@ RADIUS = 12
 _ROUNDS = 4
 
 
-@kernel
+@routine
 def _moments(points, rows):
     """Return the mean of some rows of points, and the sums of squares and products about it."""
     count = len(rows)
@@ -30,7 +30,7 @@ def _moments(points, rows):
     return x, y, z, xx, xy, xz, yy, yz, zz
 
 
-@kernel
+@routine
 def fit_line(points, rows, shape):
     """Write the line through some rows of points, and return the mean of the squared distances."""
     count = len(rows)
@@ -51,7 +51,7 @@ def fit_line(points, rows, shape):
     return max(smallest + middle, 0.0) / count if total > 0.0 else 0.0
 
 
-@kernel
+@routine
 def set_frame(shape, x, y, z, dx, dy, dz):
     """Write the origin and three axes, of which the third is given."""
     ux, uy, uz, vx, vy, vz = tangents(dx, dy, dz)
@@ -61,7 +61,7 @@ def set_frame(shape, x, y, z, dx, dy, dz):
     shape[9], shape[10], shape[11] = dx, dy, dz
 
 
-@kernel
+@routine
 def fit_circle(points, rows, shape):
     """Write the circle through some rows of points, and return the mean of the squared distances; inf if none fits."""
     count = len(rows)
@@ -113,7 +113,7 @@ def fit_circle(points, rows, shape):
     return total / count
 
 
-@kernel
+@routine
 def offset_of(shape, x, y, z):
     """Return how far a place is from a shape."""
     a, b, c = local(shape, x, y, z)
@@ -121,7 +121,7 @@ def offset_of(shape, x, y, z):
     return rho if shape[RADIUS] == 0.0 else math.sqrt((rho - shape[RADIUS]) ** 2 + c * c)
 
 
-@kernel
+@routine
 def local(shape, x, y, z):
     """Return the coordinates of a place in the axes of a shape."""
     x, y, z = x - shape[0], y - shape[1], z - shape[2]
@@ -132,14 +132,14 @@ def local(shape, x, y, z):
     )
 
 
-@kernel
+@routine
 def along_of(shape, x, y, z):
     """Return how far along a shape a place is: from a line's origin, from a circle's first axis -pi r to pi r."""
     a, b, c = local(shape, x, y, z)
     return c if shape[RADIUS] == 0.0 else shape[RADIUS] * math.atan2(b, a)
 
 
-@kernel
+@routine
 def tangent_of(shape, x, y, z):
     """Return the unit tangent of a shape beside a place."""
     if shape[RADIUS] == 0.0:

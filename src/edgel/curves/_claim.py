@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import kernel, routine
 from edgel.curves._circle import offset_of, tangent_of
 from edgel.curves._smooth import Smoothed
 
@@ -56,7 +56,7 @@ def _flood(order, shapes, rows, first, position, tangent, neighbors, spacing, ow
                     height += 1
 
 
-@kernel
+@routine
 def _belongs(shape, i, position, tangent, spacing, margin):
     x, y, z = position[i, 0], position[i, 1], position[i, 2]
     if offset_of(shape, x, y, z) > margin * ASIDE * spacing[i]:

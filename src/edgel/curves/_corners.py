@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import kernel, routine
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import knn
 from edgel.curves._circle import RADIUS, offset_of
@@ -115,7 +115,7 @@ def _join(a, b, ring, places, tangents, squares, rights, curve, shapes, spacing)
             ring[one], ring[two] = ring[two], ring[one]
 
 
-@kernel
+@routine
 def _members(end, ring, members):
     """Write the ends of a group, and return how many there are, as many as there is room for."""
     members[0] = end
@@ -127,7 +127,7 @@ def _members(end, ring, members):
     return count
 
 
-@kernel
+@routine
 def _solve(members, count, places, squares, rights, spacing, curve, position):
     """Write where the planes of some ends meet, and return the standard deviation of that place."""
     matrix, side, mean = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
@@ -150,7 +150,7 @@ def _solve(members, count, places, squares, rights, spacing, curve, position):
     return math.sqrt(inverse[0, 0] + inverse[1, 1] + inverse[2, 2])
 
 
-@kernel
+@routine
 def _agrees(end, ring, places, tangents, squares, rights, curve, shapes, spacing):
     members = np.empty(2 * _MOST, np.int64)
     count = _members(end, ring, members)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel, run_slices
+from edgel._kernels.parallel import kernel, routine, run_slices
 from edgel.curves import _fit
 from edgel.curves._circle import RADIUS, along_of
 from edgel.curves._gather import widened
@@ -88,14 +88,14 @@ def _extents(
         _intervals(speaks, edges, h, low[k], width, whole[k], k, ends, closed, found, number)
 
 
-@kernel
+@routine
 def _bin(along, low, width, around):
     if around > 0.0:
         along -= around * np.floor((along - low) / around)
     return int(np.floor((along - low) / width))
 
 
-@kernel
+@routine
 def _count_sides(shape, fit, beside, xyz, h, low, width, around, sides):
     """Count the points of either face in each bin along a shape, near the edge."""
     for i in beside:
@@ -116,7 +116,7 @@ def _count_sides(shape, fit, beside, xyz, h, low, width, around, sides):
             sides[bin_, which] += 1
 
 
-@kernel
+@routine
 def _intervals(speaks, edges, h, low, width, whole, k, ends, closed, found, number):
     """Write the runs of bins that speak for the edge, small gaps bridged, and edge points among them."""
     bins = len(speaks)

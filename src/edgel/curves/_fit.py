@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from edgel._kernels.cholesky import factorize
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import routine
 
 # Columns of a fit, one row a curve.
 NORMALS, INWARD, BEND, OFFSETS, COUNTS, SIGMA = 0, 4, 8, 10, 12, 14
@@ -35,7 +35,7 @@ FLOOR = 0.03
 """Spacings: faces are no smoother than that."""
 
 
-@kernel
+@routine
 def tolerance_of(turn, sigma, h):
     """Return how far from a face its points may lie, in a round."""
     if turn < len(TOLERANCES):
@@ -43,14 +43,14 @@ def tolerance_of(turn, sigma, h):
     return min(max(4.0 * sigma, 0.15 * h), 1.2 * h)
 
 
-@kernel
+@routine
 def weight_of(off, tolerance):
     """Return Tukey's weight of a distance."""
     q = 1.0 - (off / tolerance) ** 2
     return q * q
 
 
-@kernel
+@routine
 def inverse_of(matrix, size):
     """Return the inverse of the leading part of a symmetric positive matrix."""
     lower, inner = np.zeros((size, size)), np.zeros((size, size))
@@ -63,7 +63,7 @@ def inverse_of(matrix, size):
     return result
 
 
-@kernel
+@routine
 def meet(a, b, c, d, p, q):
     """Return where the lines of normals (a, b) and (c, d) at distances p and q meet; NaN where they do not."""
     det = a * d - b * c

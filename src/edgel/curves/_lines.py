@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import routine
 from edgel.curves import _fit
 from edgel.curves._circle import local, set_frame
 from edgel.curves._profile import choose_sides, face_of, mean_normals
@@ -15,7 +15,7 @@ _SHORT = 6  # edge points: with fewer the direction along a free end is not fitt
 _CORRELATED = 3.0  # edge points next to each other come from the same points of the cloud
 
 
-@kernel
+@routine
 def fit_line_faces(shape, beside, xyz, rows, position, normals, h, reach, low, high, fit):
     """Move a line to where its faces meet, and write what is known of them.
 
@@ -104,7 +104,7 @@ def fit_line_faces(shape, beside, xyz, rows, position, normals, h, reach, low, h
     fit[_fit.ANGLE_STD] = math.sqrt(max(covariance[0, 2, 2] + covariance[1, 2, 2], 0.0)) / h
 
 
-@kernel
+@routine
 def _solve_face(system, right, h, turn, spread, covariance):
     """Return offset, slope, turn and bend of a face, and write their covariance; flat unless it surely bends."""
     for i in range(4):
@@ -126,7 +126,7 @@ def _solve_face(system, right, h, turn, spread, covariance):
     return unknowns
 
 
-@kernel
+@routine
 def _free_end(shape, rows, position, inward, x0, x1, y0, y1, middle, half, h, covariance):
     """Return where the edge points of a line lie along its only face, how that runs, and their spread."""
     s0 = s1 = s2 = r0 = r1 = square = 0.0
@@ -150,7 +150,7 @@ def _free_end(shape, rows, position, inward, x0, x1, y0, y1, middle, half, h, co
     return end, run, spread
 
 
-@kernel
+@routine
 def _write(shape, fit, faces, inward, bend, spread, number, covariance, middle, half, x0, x1, y0, y1):
     """Write the line into the shape, and the faces in the new profile."""
     dx, dy = x1 / half, y1 / half

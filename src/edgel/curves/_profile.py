@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import math
 
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import routine
 from edgel.curves._circle import RADIUS, local
 
 NEAR = 0.6
 """Spacings: points nearer to the edge could belong to either face."""
 
 
-@kernel
+@routine
 def in_profile(shape, x, y, z):
     """Return a place's coordinates across a shape, and the one along it."""
     a, b, c = local(shape, x, y, z)
@@ -23,7 +23,7 @@ def in_profile(shape, x, y, z):
     return math.sqrt(a * a + b * b) - shape[RADIUS], c, shape[RADIUS] * math.atan2(b, a)
 
 
-@kernel
+@routine
 def turn_to_profile(shape, x, y, z, nx, ny, nz):
     """Return the components of a vector at a place in the profile there."""
     u = nx * shape[3] + ny * shape[4] + nz * shape[5]
@@ -35,7 +35,7 @@ def turn_to_profile(shape, x, y, z, nx, ny, nz):
     return ((a * u + b * v) / rho if rho > 0.0 else 0.0), nx * shape[9] + ny * shape[10] + nz * shape[11]
 
 
-@kernel
+@routine
 def mean_normals(shape, rows, position, normals, faces):
     """Write the mean normals of both faces in the profile (2, 2); of length 0 where there is none."""
     for turn in range(3):
@@ -68,7 +68,7 @@ def mean_normals(shape, rows, position, normals, faces):
         faces[1, 0], faces[1, 1] = 0.0, 0.0
 
 
-@kernel
+@routine
 def choose_sides(profile, h, tolerance, faces, inward):
     """Write for each face (2, 2) on which side of the edge it lies: the one with more points."""
     for k in range(2):
@@ -88,7 +88,7 @@ def choose_sides(profile, h, tolerance, faces, inward):
         inward[k, 0], inward[k, 1] = sign * a, sign * b
 
 
-@kernel
+@routine
 def face_of(a, b, h, tolerance, reach, faces, inward, bend):
     """Return which face a point of the profile belongs to, its distance from it, and how far along it: -1 for none."""
     found, least, far = -1, tolerance, 0.0

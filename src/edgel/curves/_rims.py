@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import routine
 from edgel.curves import _fit
 from edgel.curves._circle import RADIUS, local
 from edgel.curves._profile import choose_sides, face_of, in_profile, mean_normals
@@ -26,7 +26,7 @@ _CHANCE = 2.2  # deviations of an amplitude
 _FIRM = 1e-4  # weight of one point for what no point decides
 
 
-@kernel
+@routine
 def fit_rim_faces(shape, beside, xyz, rows, position, normals, h, reach, low, high, fit, covariance):
     """Move a circle to where its faces meet; write what is known of them, and the covariance (10, 10) of all unknowns.
 
@@ -81,7 +81,7 @@ def fit_rim_faces(shape, beside, xyz, rows, position, normals, h, reach, low, hi
     fit[_fit.TURN_STD] = math.sqrt(covariance[0, 0] + covariance[1, 1])
 
 
-@kernel
+@routine
 def _ripple(shape, inside, xyz, h, reach, sigma, faces, inward, bend):
     """Return by how much more than chance a wall goes in and out three to six times on the way round."""
     wall = 0 if abs(faces[0, 0]) >= abs(faces[1, 0]) else 1
@@ -106,7 +106,7 @@ def _ripple(shape, inside, xyz, h, reach, sigma, faces, inward, bend):
     return max(most - _CHANCE * math.sqrt(2.0 * square) / count, 0.0)
 
 
-@kernel
+@routine
 def _inside(shape, beside, xyz, middle, half, whole):
     """Return the points beside an arc that are not past its ends, and their profile."""
     inside, profile = np.empty(len(beside), np.int64), np.empty((len(beside), 2))
@@ -122,7 +122,7 @@ def _inside(shape, beside, xyz, middle, half, whole):
     return inside[:number], profile[:number]
 
 
-@kernel
+@routine
 def _derivatives(shape, a, b, c, mr, mz, h, terms):
     """Write how a distance with normal (mr, mz) in the profile changes with tilt, centre, radius and height."""
     rho = math.sqrt(a * a + b * b)
@@ -133,7 +133,7 @@ def _derivatives(shape, a, b, c, mr, mz, h, terms):
     terms[4], terms[5] = -mr * h, -mz * h
 
 
-@kernel
+@routine
 def _collect(shape, inside, xyz, h, reach, tolerance, faces, inward, bend, spread, system, right, number):
     """Add up the equations of all points of the faces, each face's by its spread, and write spreads and numbers."""
     system[:], right[:], number[:] = 0.0, 0.0, 0.0
@@ -166,7 +166,7 @@ def _collect(shape, inside, xyz, h, reach, tolerance, faces, inward, bend, sprea
             spread[k] = 1.1 * math.sqrt(square[k] / max(weights[k] - 4.0, 1.0))
 
 
-@kernel
+@routine
 def _collect_edge(shape, rows, position, h, across, system, right):
     """Add the equations of the edge points, along the only face, and return their spread."""
     terms = np.zeros(UNKNOWNS)
@@ -191,7 +191,7 @@ def _collect_edge(shape, rows, position, h, across, system, right):
     return spread
 
 
-@kernel
+@routine
 def _solve(system, right, free, h, radius, covariance, judge):
     """Solve for the free unknowns, into `right`, and write their covariance in the cloud's unit (tilts in radians)."""
     for m in range(UNKNOWNS):
@@ -219,7 +219,7 @@ def _solve(system, right, free, h, radius, covariance, judge):
             covariance[which[m], which[n]] = inverse[m, n] * scale[which[m]] * scale[which[n]]
 
 
-@kernel
+@routine
 def _solve_free(system, right, free):
     """Return which unknowns are free, the inverse of their equations, and their solution."""
     which = np.flatnonzero(free)
@@ -235,7 +235,7 @@ def _solve_free(system, right, free):
     return which, inverse, inverse @ side
 
 
-@kernel
+@routine
 def _move(shape, faces, inward, bend, step, free, h):
     """Turn and shift the shape and its faces by a step of the unknowns."""
     radius = shape[RADIUS]
@@ -264,7 +264,7 @@ def _move(shape, faces, inward, bend, step, free, h):
         bend[k] = bend[k] + step[BENT + k] / h if free[BENT + k] else 0.0
 
 
-@kernel
+@routine
 def _square_up(faces, inward, covariance, free):
     """Where a face is a plane across the axis, or a cylinder, but for its uncertainty, it is that."""
     for k in range(2):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel, run_slices
+from edgel._kernels.parallel import kernel, routine, run_slices
 from edgel.curves._chains import Chains
 from edgel.curves._circle import RADIUS, SHAPE, fit_circle, fit_line
 
@@ -104,7 +104,7 @@ def _split_chains(start, stop, points, begin, closed, position, spacing, spread,
             fits[slot + k] = square / (b - a) < max(_FREE * sigma, 0.25 * h) ** 2
 
 
-@kernel
+@routine
 def _squared(shape, position, i):
     x, y, z = position[i, 0] - shape[0], position[i, 1] - shape[1], position[i, 2] - shape[2]
     a = x * shape[3] + y * shape[4] + z * shape[5]
@@ -115,7 +115,7 @@ def _squared(shape, position, i):
     return (math.sqrt(a * a + b * b) - shape[RADIUS]) ** 2 + c * c
 
 
-@kernel
+@routine
 def _best(rows, position, h, sigma, shape):
     """Write the line or the arc that explains some rows at less cost, and return the cost."""
     penalty = math.log(max(len(rows), 3))
@@ -131,7 +131,7 @@ def _best(rows, position, h, sigma, shape):
     return cost
 
 
-@kernel
+@routine
 def _cost(rows, position, sigma, shape):
     total = 0.0
     for i in rows:
@@ -139,7 +139,7 @@ def _cost(rows, position, sigma, shape):
     return total / _ALIKE
 
 
-@kernel
+@routine
 def _merge(rows, position, h, sigma, cuts, shape, closed):
     """Write the pieces of a chain and their shapes, and return how many there are."""
     count = len(rows)
@@ -177,7 +177,7 @@ def _merge(rows, position, h, sigma, cuts, shape, closed):
     return pieces
 
 
-@kernel
+@routine
 def _move_borders(rows, position, h, sigma, pieces, cuts, shape):
     """Move each border to where the shapes beside it explain most."""
     for k in range(pieces - 1):

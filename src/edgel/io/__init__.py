@@ -172,8 +172,8 @@ def write(path: str | os.PathLike[str] | BinaryIO, cloud: Cloud) -> None:
     Parameters
     ----------
     path : path or binary file
-        PLY, PCD, LAS, LAZ, XYZ, TXT, CSV, ASC, PTS, NPY, NPZ or E57. An open binary file (``sys.stdout.buffer``) gets
-        PLY.
+        PLY, PCD, LAS, LAZ, COPC (``.copc.laz``), XYZ, TXT, CSV, ASC, PTS, NPY, NPZ or E57. An open binary file
+        (``sys.stdout.buffer``) gets PLY.
     cloud : Cloud
         What each format keeps is said in its module; values are never rounded silently, save coordinates to the grid of
         LAS and, below 10,000, to the single precision of PCD.

@@ -46,8 +46,21 @@ _MAGIC: list[tuple[bytes, str, str]] = [
 _NUMBERS = re.compile(
     rb"\s*[-+]?(\d|\.\d|nan)[-+.\deEnaif]*([\s,;]+[-+]?(\d|\.\d|nan)[-+.\deEnaif]*){2,}", re.IGNORECASE
 )
+COPC = ".copc.laz"  # an extension in two parts
 # How the names of temporary files begin; the process and a random word follow.
 _TEMPORARY = ".edgel-"
+
+
+def stem(path: str | os.PathLike[str]) -> str:
+    """Return the name of a file without its extension.
+
+    Examples
+    --------
+    >>> stem("city/a.b.laz"), stem("city/a.copc.laz")
+    ('a.b', 'a')
+    """
+    name = Path(path)
+    return name.name[: -len(COPC)] if name.name.lower().endswith(COPC) else name.stem
 
 
 def describe(head: bytes) -> tuple[str, str]:

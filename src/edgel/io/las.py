@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, BinaryIO
 
 import laspy
@@ -53,6 +55,41 @@ def read(path: str | os.PathLike[str]) -> Cloud:
     ...     read(f"{folder}/a.laz").attributes["intensity"]
     array([1, 2, 3], dtype=uint16)
     """
+    with _opened(path) as (name, reader):
+        columns = _read_columns(name, reader)
+    return _cloud(name, reader.header, columns)
+
+
+def read_chunks(path: str | os.PathLike[str], rows: int) -> Iterator[Cloud]:
+    """Read consecutive stretches of so many rows, each as `read` would; at least one, empty where the file is.
+
+    Raises
+    ------
+    FormatError
+        As `read`; of what is wrong with the points, when they are reached.
+    """
+    with _opened(path) as (name, reader):
+        names, found = list(reader.header.point_format.dimension_names), 0
+        for points in reader.chunk_iterator(rows):
+            found += len(points)
+            yield _cloud(name, reader.header, {column: np.array(points[column]) for column in names})
+        _check_count(name, reader.header, found)
+        if not found:
+            yield _cloud(name, reader.header, _no_columns(reader.header))
+
+
+def count_rows(path: str | os.PathLike[str]) -> int | None:
+    """Return the number of points that the header promises; None where it cannot be read."""
+    try:
+        with _opened(path) as (_, reader):
+            return int(reader.header.point_count)
+    except (FormatError, OSError):
+        return None
+
+
+@contextmanager
+def _opened(path: str | os.PathLike[str]) -> Iterator[tuple[str, laspy.LasReader]]:
+    """Open a file whose header has been checked; yields its name too."""
     name = os.fspath(path)
     with reading(path) as file:
         size = os.fstat(file.fileno()).st_size
@@ -63,20 +100,22 @@ def read(path: str | os.PathLike[str]) -> Cloud:
         file.seek(0)
         backend: Any = CheckedLaz(name, size)  # laspy asks for its own type, and needs two methods of it
         with foreign_errors(name, "reading LAS"), laspy.open(file, closefd=False, laz_backend=backend) as reader:
-            header = reader.header
-            _check_size(name, header, size)
-            columns = _read_columns(name, reader)
-        scales, offsets = np.asarray(header.scales), np.asarray(header.offsets)
-        if not (np.isfinite(scales).all() and np.isfinite(offsets).all()):
-            raise FormatError(
-                f"{name}: the scales {scales} or offsets {offsets} of the header are not finite; get the file again"
-            )
-        with np.errstate(over="ignore", invalid="ignore"):
-            xyz = np.column_stack([columns.pop(axis) * scales[i] + offsets[i] for i, axis in enumerate("XYZ")])
-        if not np.isfinite(xyz).all():
-            raise FormatError(
-                f"{name}: scales {scales} make coordinates infinite; the header is damaged: get the file again"
-            )
+            _check_size(name, reader.header, size)
+            yield name, reader
+
+
+def _cloud(name: str, header: laspy.LasHeader, columns: dict[str, np.ndarray]) -> Cloud:
+    scales, offsets = np.asarray(header.scales), np.asarray(header.offsets)
+    if not (np.isfinite(scales).all() and np.isfinite(offsets).all()):
+        raise FormatError(
+            f"{name}: the scales {scales} or offsets {offsets} of the header are not finite; get the file again"
+        )
+    with np.errstate(over="ignore", invalid="ignore"):
+        xyz = np.column_stack([columns.pop(axis) * scales[i] + offsets[i] for i, axis in enumerate("XYZ")])
+    if not np.isfinite(xyz).all():
+        raise FormatError(
+            f"{name}: scales {scales} make coordinates infinite; the header is damaged: get the file again"
+        )
     metadata: dict[str, object] = {"las_header": header}
     if left_out := waveforms_of(header):
         metadata["left_out"] = (left_out,)
@@ -118,10 +157,18 @@ def _read_columns(path: str, reader: laspy.LasReader) -> dict[str, np.ndarray]:
         for name in names:
             parts[name].append(np.array(points[name]))
     found = sum(map(len, parts["X"]))
-    if found != reader.header.point_count:
-        declared = reader.header.point_count
-        raise FormatError(f"{path}: declared {declared} points, found {found}; the file is cut off: get it again")
+    _check_count(path, reader.header, found)
     if not found:
-        empty = laspy.ScaleAwarePointRecord.zeros(0, header=reader.header)
-        return {name: np.array(empty[name]) for name in names}
+        return _no_columns(reader.header)
     return {name: arrays[0] if len(arrays) == 1 else np.concatenate(arrays) for name, arrays in parts.items()}
+
+
+def _check_count(path: str, header: laspy.LasHeader, found: int) -> None:
+    if found != header.point_count:
+        declared = header.point_count
+        raise FormatError(f"{path}: declared {declared} points, found {found}; the file is cut off: get it again")
+
+
+def _no_columns(header: laspy.LasHeader) -> dict[str, np.ndarray]:
+    empty = laspy.ScaleAwarePointRecord.zeros(0, header=header)
+    return {name: np.array(empty[name]) for name in header.point_format.dimension_names}

@@ -1,4 +1,4 @@
-"""LAS and LAZ writing by laspy: what a file said is said again, what is new goes into extra dimensions."""
+"""LAS, LAZ and COPC writing by laspy: what a file said is said again, what is new goes into extra dimensions."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import numpy as np
 
 from edgel.cloud import Cloud
 from edgel.io.columns import flat_attributes
+from edgel.io.copc import as_copc, write_nodes
 from edgel.io.errors import FormatError, tell
-from edgel.io.files import replacing
+from edgel.io.files import COPC, replacing
 from edgel.io.las_extra import fit_dimensions
 from edgel.io.las_grid import choose_grid
 from edgel.io.las_header import WAVEFORM, foreign_errors, header_for
@@ -20,15 +21,15 @@ _EVLR_HEADER = 60
 
 
 def write(path: str | os.PathLike[str], cloud: Cloud) -> None:
-    """Write a LAS file, or a LAZ file when the name ends in ``.laz``.
+    """Write a LAS file, a LAZ file when the name ends in ``.laz``, and COPC when it ends in ``.copc.laz``.
 
     A cloud read from LAS keeps its header: version (but 1.0 becomes 1.2), point format, records (VLR and EVLR), CRS,
     and scales and offsets as long as all points still lie on their grid. Otherwise the scale is the smallest power of
     ten for which the extent fits 32-bit integers (0.001 mm for a kilometre in metres), and the offset the largest round
     number below the smallest coordinate. Attributes that LAS does not know become extra dimensions, with a
     description; so does, as ``<name>_exact``, one whose values the dimension of its name cannot hold (an intensity of
-    0..1). Organized shape and viewpoint are not kept, LAS has no place for them. COPC is written as plain LAZ; LAZ has
-    no wave packets.
+    0..1). Organized shape and viewpoint are not kept, LAS has no place for them. LAZ has no wave packets. COPC sorts
+    the points by the cubes of an octree, and is LAS 1.4 with point formats 6 to 8.
 
     Parameters
     ----------
@@ -63,10 +64,12 @@ def write(path: str | os.PathLike[str], cloud: Cloud) -> None:
             "(cloud.take(np.isfinite(cloud.xyz).all(axis=1))) or write .ply, .pcd or .npz"
         )
     said: dict[str, str] = {}
-    packed = name.lower().endswith(".laz")
+    packed, in_cubes = name.lower().endswith(".laz"), name.lower().endswith(COPC)
     attributes = flat_attributes(cloud, said, keep_arrays=True)
     with foreign_errors(name, "encoding LAS"):
         header = header_for(cloud, attributes, said, packed=packed)
+        if in_cubes:
+            as_copc(header, attributes, said)
         values = fit_dimensions(header, attributes, said)
         header.scales, header.offsets = choose_grid(
             cloud.xyz, header.scales, header.offsets, new="las_header" not in cloud.metadata
@@ -79,7 +82,10 @@ def write(path: str | os.PathLike[str], cloud: Cloud) -> None:
             record[dimension] = column
     tell(name, said)
     with replacing(path) as file:
-        _write_records(file, header, record, packed=packed)
+        if in_cubes:
+            write_nodes(file, header, record)
+        else:
+            _write_records(file, header, record, packed=packed)
 
 
 def _write_records(file: object, header: laspy.LasHeader, record: laspy.ScaleAwarePointRecord, *, packed: bool) -> None:

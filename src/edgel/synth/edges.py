@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel, run_slices
+from edgel._kernels.parallel import kernel, routine, run_slices
 from edgel.cloud import as_cloud
 
 EDGE_KINDS = ("boundary", "crease")
@@ -180,7 +180,7 @@ def _box_tree(begin: np.ndarray, end: np.ndarray) -> np.ndarray:
     return tree
 
 
-@kernel
+@routine
 def _box_distance2(tree, node, x, y, z):
     dx = max(tree[node, 0] - x, 0.0, x - tree[node, 3])
     dy = max(tree[node, 1] - y, 0.0, y - tree[node, 4])
@@ -188,7 +188,7 @@ def _box_distance2(tree, node, x, y, z):
     return dx * dx + dy * dy + dz * dz
 
 
-@kernel
+@routine
 def _foot(begin, end, i, x, y, z):
     """Squared distance to segment i, and where along it (0 to 1) the foot lies."""
     ex, ey, ez = end[i, 0] - begin[i, 0], end[i, 1] - begin[i, 1], end[i, 2] - begin[i, 2]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel, run_slices
+from edgel._kernels.parallel import kernel, routine, run_slices
 from edgel._neighbors.kdtree import build_index, node_start
 from edgel.synth.solid import Solid
 
@@ -96,7 +96,7 @@ def cast(tree: RayTree, origins: np.ndarray, directions: np.ndarray) -> RayHits:
     return RayHits(distance, triangle, weights)
 
 
-@kernel
+@routine
 def _enters(boxes, node, ray, inverse, nearest):
     """Distance at which a ray enters a box; infinite when it misses it or enters beyond `nearest`."""
     low, high = 0.0, nearest
@@ -112,7 +112,7 @@ def _enters(boxes, node, ray, inverse, nearest):
     return low if low <= high * (1.0 + 1e-12) + 1e-12 else np.inf
 
 
-@kernel
+@routine
 def _meets(t, ray):
     """Distance along a ray to a triangle (9,) and the barycentric coordinates of its second and third corner."""
     px, py, pz = ray[4] * t[8] - ray[5] * t[7], ray[5] * t[6] - ray[3] * t[8], ray[3] * t[7] - ray[4] * t[6]

@@ -27,16 +27,29 @@ class Engine:
     client: Any
     progress: Callable[[str], None]
 
-    def run(self, what: str, task: Callable[..., Any], jobs: Sequence[tuple[Any, ...]]) -> dict[int, BaseException]:
-        """Run ``task(*job)`` for each; returns what those raised that failed twice, by their number."""
-        failed = dict(self._attempt(what, task, dict(enumerate(jobs))))
+    def run(
+        self,
+        what: str,
+        task: Callable[..., Any],
+        jobs: Sequence[tuple[Any, ...]],
+        check: Callable[[], None] | None = None,
+    ) -> dict[int, BaseException]:
+        """Run ``task(*job)`` for each; returns what those raised that failed twice, by their number.
+
+        `check` is called when the first is done, and whenever twice as many are: what it raises ends the run.
+        """
+        failed = dict(self._attempt(what, task, dict(enumerate(jobs)), check))
         for number in failed.copy():
             del failed[number]
             failed |= self._attempt(f"{what}, again", task, {number: jobs[number]})
         return failed
 
     def _attempt(
-        self, what: str, task: Callable[..., Any], jobs: dict[int, tuple[Any, ...]]
+        self,
+        what: str,
+        task: Callable[..., Any],
+        jobs: dict[int, tuple[Any, ...]],
+        check: Callable[[], None] | None = None,
     ) -> Iterator[tuple[int, BaseException]]:
         begin = time.monotonic()
         finish = self._by_dask(task, jobs) if self.client is not None else _here(task, jobs)
@@ -46,6 +59,8 @@ class Engine:
             self.progress(f"{what}: {done} of {len(jobs)}, about {left:.0f} s left")
             if error is not None:
                 failed.append((number, error))
+            if check is not None and done & (done - 1) == 0:
+                check()
         return iter(failed)
 
     def _by_dask(
@@ -97,7 +112,7 @@ def start(workers: int, scheduler: str | None, progress: Callable[[str], None]) 
             threads_per_worker=1,
             processes=True,
             memory_limit=0,
-            dashboard_address=None,  # pyright: ignore[reportArgumentType] - its way to have none
+            dashboard_address=":0",  # any port: another run may have the usual one
             env={"EDGEL_NUM_THREADS": str(threads)},
         ) as cluster,
         Client(cluster) as client,

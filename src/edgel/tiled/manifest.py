@@ -12,6 +12,7 @@ from typing import Any
 import llvmlite.binding
 
 import edgel
+from edgel.tiled.aside import made_aside
 from edgel.tiled.plan import Options
 from edgel.tiled.spool import hash_of
 
@@ -44,9 +45,8 @@ def check_manifest(folder: Path, files: Sequence[str], options: Options) -> list
                 )
         _compare_inputs(folder, stored["inputs"], wanted["inputs"])
         stored["cpus"] = sorted({*stored["cpus"], cpu})
-    aside = folder / f"{_FILE}.{os.getpid()}.part"
-    aside.write_text(json.dumps(stored, indent=1))
-    os.replace(aside, path)
+    with made_aside(path) as beside:
+        beside.write_text(json.dumps(stored, indent=1))
     if len(stored["cpus"]) > 1:
         kinds = ", ".join(stored["cpus"])
         return [f"made on several kinds of CPU ({kinds}): the last bits of results may differ between them"]

@@ -6,19 +6,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from edgel._neighbors.kdtree import build_index
+from edgel._neighbors.kdtree import NeighborIndex, build_index, chosen
 from edgel._neighbors.knn import knn
 from edgel._neighbors.queries import at_places
-from edgel._neighbors.scan_lines import AREA, are_lines, on_lines
+from edgel._neighbors.scan_lines import AREA, are_lines, on_lines, stretch_along_lines, stretch_reach
 from edgel._neighbors.scan_lines import SAMPLE as LINES_SAMPLE
+from edgel._neighbors.spacing import disc_radii, rounded_spacing
 from edgel._range_image import FEW, direction_that_explains
-from edgel._surface.plane_scales import NUM_FEATURES
+from edgel._surface.plane_scales import NUM_FEATURES, SCALES
 from edgel._surface.smoothing import SAMPLE as NOISE_SAMPLE
 from edgel._surface.smoothing import noise_at, noise_of, share_of
 from edgel._surface.statistics import SAMPLE, Statistics, describe_places, statistics_of
 from edgel.tiled.plan import Plan
 
-_HALO = 12.0  # spacings, at first
+_SIDE = 8.0  # spacings, at first, of the cells around a sampled point that are looked at
+_NUMBERS = (SAMPLE, NOISE_SAMPLE, LINES_SAMPLE, FEW)
 
 
 def measure(plan: Plan, tile: int) -> None:
@@ -26,34 +28,86 @@ def measure(plan: Plan, tile: int) -> None:
     plan.keep("measure", tile, lambda: _measure(plan, tile))
 
 
+def measure_on_lines(plan: Plan, tile: int) -> None:
+    """Describe them again, where they turned out to lie on scan lines."""
+    plan.keep("measure on lines", tile, lambda: _measure_on_lines(plan, tile))
+
+
 def _measure(plan: Plan, tile: int) -> dict[str, np.ndarray]:
-    halo, core, total = _HALO * plan.apart, plan.tiles[tile], plan.num_points
-    while True:
-        window = plan.window(tile, halo, plan.apart)
-        xyz, _ = plan.spool.load(window)
-        empty = {name: np.zeros(0) for name in ("spacing", "noise", "lines")}
-        empty |= {"features": np.zeros((0, NUM_FEATURES)), "few": np.zeros((0, 3))}
-        if not core.holds(xyz).any():
-            return {**empty, "read": np.array(len(xyz))}
-        index = build_index(xyz)
-        own = core.holds(index.xyz.T)
-        places = (index.sampled(number, total) for number in (SAMPLE, NOISE_SAMPLE, LINES_SAMPLE, FEW))
-        described, noisy, lined, few = (some[own[some]] for some in places)
-        k, asked = min(AREA, len(index)), np.unique(np.concatenate([described, noisy, lined]))
-        reach = knn(index, at_places(index, asked), k).distances[:, -1]
-        deep = window.depth(index.at(asked))
-        if window.endless or (len(index) >= AREA and (reach < deep).all()):
-            break
-        halo *= 2
-    features, spacing = describe_places(index, described)
-    return {
-        "features": features,
-        "spacing": spacing,
-        "noise": noise_at(index, noisy),
-        "lines": on_lines(index, lined) if len(index) >= AREA else np.zeros(len(lined), bool),
-        "few": index.at(few),
-        "read": np.array(len(xyz)),
-    }
+    side = _SIDE * plan.apart
+    while (some := _sampled(plan, tile, side)) is not None:
+        index, total = some.index, plan.num_points
+        places = (index.sampled(number, total) for number in _NUMBERS)
+        described, noisy, lined, few = (each[some.own[each]] for each in places)
+        asked = np.unique(np.concatenate([described, noisy, lined]))
+        reach = knn(index, at_places(index, asked), min(AREA, len(index))).distances[:, -1]
+        if some.is_all or (len(index) >= AREA and (reach < side).all()):
+            features, spacing = describe_places(index, described)
+            return {
+                "features": features,
+                "spacing": spacing,
+                "noise": noise_at(index, noisy),
+                "disc": disc_radii(index, noisy),
+                "lines": on_lines(index, lined) if len(index) >= AREA else np.zeros(len(lined), bool),
+                "few": index.at(few),
+            }
+        side *= 2
+    none = np.zeros(0)
+    return {**_nothing(), "noise": none, "disc": none, "lines": none, "few": np.zeros((0, 3))}
+
+
+def _measure_on_lines(plan: Plan, tile: int) -> dict[str, np.ndarray]:
+    side = _SIDE * plan.apart
+    while (some := _sampled(plan, tile, side)) is not None:
+        index = some.index
+        described = index.sampled(SAMPLE, plan.num_points)
+        described = described[some.own[described]]
+        stretch, k = stretch_along_lines(index), min(SCALES[-1], len(index))
+        reach = knn(index, at_places(index, described, stretch=stretch), k).distances[:, -1]
+        reach = np.maximum(reach, stretch_reach(index)[described])
+        if some.is_all or (len(index) >= AREA and (reach < side).all()):
+            features, spacing = describe_places(index, described, stretch)
+            return {"features": features, "spacing": spacing}
+        side *= 2
+    return _nothing()
+
+
+def _nothing() -> dict[str, np.ndarray]:
+    return {"features": np.zeros((0, NUM_FEATURES)), "spacing": np.zeros(0)}
+
+
+@dataclass(frozen=True, eq=False)
+class _Sampled:
+    """Points around those that may be sampled."""
+
+    index: NeighborIndex
+    own: np.ndarray  # (N,) bool, by place: whether it lies in the core of the tile
+    is_all: bool  # whether there are no others
+
+
+def _sampled(plan: Plan, tile: int, side: float) -> _Sampled | None:
+    """Read all points within `side` of those that may be sampled in the core of a tile; None if there are none."""
+    core, window = plan.tiles[tile], plan.window(tile, side, plan.apart)
+    xyz, _ = plan.spool.load(window)
+    picked = core.holds(xyz) & chosen(np.ascontiguousarray(xyz.T), max(_NUMBERS), plan.num_points)
+    if not picked.any():
+        return None
+    near = _cells_around(xyz, picked, side)
+    index = build_index(xyz[near])
+    return _Sampled(index, core.holds(index.xyz.T), window.endless and bool(near.all()))
+
+
+def _cells_around(xyz: np.ndarray, picked: np.ndarray, side: float) -> np.ndarray:
+    """Say which points (N, 3) lie in a cell with a picked point, seen from above, or in one beside it, (N,) bool."""
+    if picked.all():
+        return picked
+    cell = np.floor(xyz[:, :2] / side)
+    column, row = (cell - cell.min(axis=0) + 1).astype(np.int64).T
+    filled = np.zeros((column.max() + 2, row.max() + 2), bool)
+    filled[column[picked], row[picked]] = True
+    for axis in (0, 1):
+        filled = filled | np.roll(filled, 1, axis) | np.roll(filled, -1, axis)
+    return filled[column, row]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,10 +119,22 @@ class Whole:
     statistics : Statistics
     from_above : bool
         Whether the view from above shows nearly all of a sample of the points, so that it tells near from far sides.
+    on_lines : bool
+        Whether the points lie on scan lines.
+    cloud_spacing : float
+        See `edgel._neighbors.spacing.cloud_spacing`.
     """
 
     statistics: Statistics
     from_above: bool
+    on_lines: bool
+    cloud_spacing: float
+
+
+def lies_on_lines(plan: Plan) -> bool:
+    """Whether the cloud lies on scan lines, by what was measured in all tiles."""
+    (lines,) = _gather(plan, "measure", "lines")
+    return plan.num_points >= AREA and are_lines(lines)
 
 
 def merge_measures(plan: Plan) -> Whole:
@@ -79,15 +145,7 @@ def merge_measures(plan: Plan) -> Whole:
     ValueError
         If the cloud is one that only a whole can be seen of: too noisy, or shown best from one side.
     """
-    found = [plan.load("measure", tile) for tile in range(len(plan.tiles))]
-    features, spacing, noise, lines, few = (
-        np.concatenate([part[name] for part in found]) for name in ("features", "spacing", "noise", "lines", "few")
-    )
-    if plan.num_points >= AREA and are_lines(lines):
-        raise ValueError(
-            "points: they lie on scan lines far apart, whose metric is not known in tiles; run it whole, or thin "
-            "it (edgel.thin) to the distance of the lines"
-        )
+    noise, disc, few = _gather(plan, "measure", "noise", "disc", "few")
     if share_of(noise_of(noise)) > 0:
         raise ValueError(
             f"points: noise of {noise_of(noise):.2f} spacings off the surface has to be smoothed away first, which is "
@@ -99,4 +157,13 @@ def merge_measures(plan: Plan) -> Whole:
             f"points: the cloud shows as a whole along {direction.round(2).tolist()}, and tiles are columns along z; "
             "turn it so that it is seen from above, or give a viewpoint"
         )
-    return Whole(statistics_of(features.astype(np.float32), spacing), direction is not None)
+    lines = lies_on_lines(plan)
+    features, spacing = _gather(plan, "measure on lines" if lines else "measure", "features", "spacing")
+    return Whole(
+        statistics_of(features.astype(np.float32), spacing), direction is not None, lines, rounded_spacing(disc)
+    )
+
+
+def _gather(plan: Plan, step: str, *names: str) -> list[np.ndarray]:
+    found = [plan.load(step, tile) for tile in range(len(plan.tiles))]
+    return [np.concatenate([part[name] for part in found]) for name in names]

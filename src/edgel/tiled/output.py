@@ -5,14 +5,18 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from edgel._faces import Faces
-from edgel._neighbors.normals import SENSOR, UNKNOWN
+from edgel._neighbors.normals import OUTWARD, OWN
 from edgel.edges import Edges
-from edgel.io import read, write
+from edgel.io import write
+from edgel.io.chunks import read_rows
+from edgel.io.files import COPC, stem
+from edgel.tiled.aside import made_aside
 from edgel.tiled.box import Box
 from edgel.tiled.plan import Plan
 from edgel.tiled.spool import ROWS, Part
@@ -31,12 +35,16 @@ def edges_of(plan: Plan, part: Part) -> Edges:
             keys.append(found["key"][mine])
             for name in _FIELDS:
                 columns[name].append(found[name][mine])
+        if plan.orientation in (OUTWARD, OWN):  # then faces were turned once all were known
+            with plan.load("turn", tile) as turned:
+                for name in turned.files:
+                    columns[name][-1] = turned[name][mine]
     key = np.concatenate(keys)
     order = np.argsort(key)
     return Edges(
         index=key[order] & ((1 << ROWS) - 1),
         **{name: np.concatenate(parts)[order] for name, parts in columns.items()},
-        orientation=UNKNOWN if plan.options.viewpoint is None else SENSOR,
+        orientation=plan.orientation,
         num_points=part.num_rows,
         num_dropped=part.num_rows - part.num_points,
         method="surface",
@@ -50,30 +58,34 @@ def write_part(folder: Path, number: int, target: str) -> None:
     """Write the edge points of one file with all their attributes, unless that is done."""
     plan = Plan.read(folder)
     part = plan.spool.parts[number]
-    done = folder / "written" / f"{number:06d}"
+    done = _written(folder, number)
     if done.exists() and Path(target).exists():
         return
     edges = edges_of(plan, part)
     if part.num_points:
-        write(target, edges.to_cloud(read(part.path)))
-    done.parent.mkdir(exist_ok=True)
-    done.touch()
+        rows = read_rows(part.path, edges.index)
+        write(target, replace(edges, index=np.arange(len(edges))).to_cloud(rows))
+    with made_aside(done) as beside:
+        beside.write_text(str(len(edges)))
+
+
+def _written(folder: Path, number: int) -> Path:
+    """Return the file that says that the edge points of an input are written, and how many."""
+    return folder / "written" / f"{number:06d}"
 
 
 def write_index(path: Path, plan: Plan, targets: Sequence[str]) -> None:
     """Write a virtual point cloud (.vpc): a STAC catalogue of the files, as PDAL and QGIS read it."""
     features = [
-        _item(part, target, path.parent)
+        _item(part, target, path.parent, int(_written(plan.folder, part.number).read_text()))
         for part, target in zip(plan.spool.parts, targets, strict=True)
         if part.num_points and Path(target).suffix.lower() in (".las", ".laz")
     ]
-    aside = path.with_name(f"{path.name}.{os.getpid()}.part")
-    aside.write_text(json.dumps({"type": "FeatureCollection", "features": features}, indent=1))
-    os.replace(aside, path)
+    with made_aside(path) as beside:
+        beside.write_text(json.dumps({"type": "FeatureCollection", "features": features}, indent=1))
 
 
-def _item(part: Part, target: str, folder: Path) -> dict[str, object]:
-    edges = len(read(target))
+def _item(part: Part, target: str, folder: Path, edges: int) -> dict[str, object]:
     (x0, y0, z0), (x1, y1, z1) = part.low, part.high
     ring = [[x0, y0, z0], [x1, y0, z0], [x1, y1, z0], [x0, y1, z0], [x0, y0, z0]]
     properties: dict[str, object] = {
@@ -81,7 +93,7 @@ def _item(part: Part, target: str, folder: Path) -> dict[str, object]:
         "start_datetime": "1970-01-01T00:00:00Z",
         "end_datetime": "1970-01-01T00:00:00Z",
         "pc:count": edges,
-        "pc:encoding": Path(target).suffix.lower()[1:],
+        "pc:encoding": "copc" if target.lower().endswith(COPC) else Path(target).suffix.lower()[1:],
         "pc:type": "lidar",
         "proj:bbox": [x0, y0, z0, x1, y1, z1],
         "proj:geometry": {"type": "Polygon", "coordinates": [ring]},
@@ -95,7 +107,7 @@ def _item(part: Part, target: str, folder: Path) -> dict[str, object]:
             "https://stac-extensions.github.io/pointcloud/v1.0.0/schema.json",
             "https://stac-extensions.github.io/projection/v1.1.0/schema.json",
         ],
-        "id": Path(target).stem,
+        "id": stem(target),
         "geometry": None,
         "links": [],
         "properties": properties,

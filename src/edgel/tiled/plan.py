@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -12,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from edgel._neighbors.normals import OUTWARD, OWN, SENSOR, UNKNOWN
+from edgel.tiled.aside import made_aside
 from edgel.tiled.box import Box
 from edgel.tiled.spool import Part, Spool, load_part
 
@@ -26,6 +27,7 @@ class Options:
     min_strength: float
     num_neighbors: int
     viewpoint: tuple[float, float, float] | None
+    orient: str
     tile_points: int
 
 
@@ -62,6 +64,13 @@ class Plan:
         return sum(part.num_points - (part.at_origin if spool.without_origin else 0) for part in spool.parts)
 
     @cached_property
+    def orientation(self) -> str:
+        """Who knows the outside: see `edgel.Edges.orientation`."""
+        if self.options.orient == OUTWARD or self.options.viewpoint is not None:
+            return OUTWARD if self.options.orient == OUTWARD else SENSOR
+        return OWN if any(part.normals for part in self.spool.parts) else UNKNOWN
+
+    @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Corners (2,) in plan of all points."""
         return bounds_of(self.spool.parts)
@@ -81,19 +90,13 @@ class Plan:
         return self.folder / step / f"{tile:06d}.npz"
 
     def keep(self, step: str, tile: int, make: Callable[[], dict[str, Any]]) -> None:
-        """Make the result of a step at a tile, unless it is there: written aside, and renamed once it is whole."""
+        """Make the result of a step at a tile, unless it is there."""
         path = self.result(step, tile)
         if path.exists():
             return
         found = make()
-        path.parent.mkdir(parents=True, exist_ok=True)
-        aside = path.with_name(f"{path.stem}.{os.getpid()}.part.npz")
-        try:
-            np.savez(aside, **found)
-            os.replace(aside, path)
-        except BaseException:  # a full disk: what is half written only takes its place
-            aside.unlink(missing_ok=True)
-            raise
+        with made_aside(path) as beside, open(beside, "wb") as file:
+            np.savez(file, **found)
 
     def load(self, step: str, tile: int) -> Any:
         """Open the result of a step at a tile."""
@@ -101,7 +104,12 @@ class Plan:
 
     def around(self, box: Box) -> list[int]:
         """Return the tiles that a box touches."""
-        return [i for i, tile in enumerate(self.tiles) if box.touches(tile.low, tile.high)]
+        return np.flatnonzero(box.touches(*self._corners)).tolist()
+
+    @cached_property
+    def _corners(self) -> tuple[np.ndarray, np.ndarray]:
+        """Corners (T, 2) of all tiles."""
+        return np.array([tile.low for tile in self.tiles]), np.array([tile.high for tile in self.tiles])
 
     def save(self) -> None:
         """Write the plan for the workers."""
@@ -112,9 +120,8 @@ class Plan:
                 "num_parts": self.num_parts,
             }
         )
-        aside = self.folder / f"plan.{os.getpid()}.part"
-        aside.write_text(text)
-        os.replace(aside, self.folder / "plan.json")
+        with made_aside(self.folder / "plan.json") as beside:
+            beside.write_text(text)
 
     @staticmethod
     def read(folder: Path) -> Plan:

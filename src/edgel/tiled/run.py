@@ -11,24 +11,21 @@ from typing import Any
 
 from edgel._detect import DEFAULT_KINDS
 from edgel._kinds import LIKELY
+from edgel._neighbors.normals import OUTWARD
+from edgel._neighbors.orientation import check_orient
 from edgel.cloud import as_vector
 from edgel.edges import EdgeKind, Edges, as_kinds
-from edgel.tiled.chains import draw_line, link_tile, merge_chains
-from edgel.tiled.classify import classify_tile
+from edgel.io.files import stem
+from edgel.tiled.aside import clear_stale
+from edgel.tiled.disk import check_before
 from edgel.tiled.engine import Engine, start
-from edgel.tiled.label import label_tile
 from edgel.tiled.manifest import check_manifest
-from edgel.tiled.measure import measure, merge_measures
 from edgel.tiled.output import edges_of, write_index, write_part
+from edgel.tiled.passes import TileError, find_edges, raise_for
 from edgel.tiled.plan import Options, Plan, cut, origin_left_out
-from edgel.tiled.spool import BYTES_A_POINT, Part, Spool, spool
+from edgel.tiled.spool import Part, Spool, spool
 
 TILE_POINTS = 3_000_000
-_EXPANDS = 8  # bytes of points in the spool for one of a compressed file, at most
-
-
-class TileError(OSError):
-    """Some files or tiles failed twice: the message names them and why, and the same call goes on with them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +71,7 @@ def detect(
     min_strength: float = LIKELY,
     num_neighbors: int = 16,
     viewpoint: Any = None,
+    orient: str = "auto",
     progress: Callable[[str], None] | None = None,
 ) -> Tiled:
     """Find the edge points of a cloud that lies in several files, tile by tile.
@@ -97,7 +95,7 @@ def detect(
         Of the files written, ``".laz"``; by default that of each input.
     overwrite : bool
         Whether results of other files or options in the folder are removed first.
-    kinds, min_strength, num_neighbors, viewpoint
+    kinds, min_strength, num_neighbors, viewpoint, orient
         As in `edgel.detect`.
     progress : callable, optional
         Called with a line for people, pass by pass and tile by tile.
@@ -127,7 +125,7 @@ def detect(
     ...     len(edgel.read(f"{folder}/out/east.npy")) == len(found.edges(1)) > 0
     True
     """
-    options = _options(kinds, min_strength, num_neighbors, viewpoint, tile_points)
+    options = _options(kinds, min_strength, num_neighbors, viewpoint, orient, tile_points)
     paths, folder, say = [os.fspath(file) for file in files], Path(folder), progress or (lambda line: None)
     if not paths:
         raise ValueError("files: none were given; name at least one")
@@ -140,18 +138,21 @@ def detect(
     work = folder / "work"
     work.mkdir(parents=True, exist_ok=True)
     notices = check_manifest(folder, paths, options)
-    _check_disk(paths, work)
+    clear_stale(folder)
+    check_before(paths, work)
     with start(workers, scheduler, say) as engine:
         plan = _prepare(engine, paths, work, options)
-        _passes(engine, plan)
+        find_edges(engine, plan)
         jobs = [(work, number, output) for number, output in enumerate(outputs)]
-        _raise_for(engine.run("writing", write_part, jobs), "file", paths)
+        raise_for(engine.run("writing", write_part, jobs), "file", paths)
     write_index(folder / "edges.vpc", plan, outputs)
     edges, read = _count(plan)
     return Tiled(folder, outputs, plan.num_points, edges, len(plan.tiles), read, notices)
 
 
-def _options(kinds: Any, min_strength: float, num_neighbors: int, viewpoint: Any, tile_points: int) -> Options:
+def _options(
+    kinds: Any, min_strength: float, num_neighbors: int, viewpoint: Any, orient: str, tile_points: int
+) -> Options:
     flags = as_kinds(kinds)
     if flags & (EdgeKind.COLOR | EdgeKind.FRAME):
         raise ValueError("kinds: color and frame edges are not looked for in tiles; leave them out")
@@ -161,28 +162,18 @@ def _options(kinds: Any, min_strength: float, num_neighbors: int, viewpoint: Any
         raise ValueError(f"num_neighbors: a plane needs at least 3, got {num_neighbors!r}")
     if tile_points < 1000:
         raise ValueError(f"tile_points: expected 1000 points or more, got {tile_points}")
+    check_orient(orient, has_viewpoint=viewpoint is not None)
     place = None if viewpoint is None else tuple(as_vector(viewpoint, "viewpoint").tolist())
-    return Options(int(flags), float(min_strength), int(num_neighbors), place, int(tile_points))
+    return Options(int(flags), float(min_strength), int(num_neighbors), place, orient, int(tile_points))
 
 
 def _outputs(paths: Sequence[str], folder: Path, extension: str | None) -> list[str]:
     """Name the output of each file by its own name; of files of one name by their numbers too."""
-    stems = [Path(path).stem for path in paths]
+    stems = [stem(path) for path in paths]
     return [
-        str(folder / f"{stem if stems.count(stem) == 1 else f'{stem}_{number}'}{extension or Path(path).suffix}")
-        for number, (path, stem) in enumerate(zip(paths, stems, strict=True))
+        str(folder / f"{own if stems.count(own) == 1 else f'{own}_{number}'}{extension or Path(path).name[len(own) :]}")
+        for number, (path, own) in enumerate(zip(paths, stems, strict=True))
     ]
-
-
-def _check_disk(paths: Sequence[str], work: Path) -> None:
-    missing = [path for n, path in enumerate(paths) if not (work / "spool" / f"{n:06d}" / "part.json").exists()]
-    needed = _EXPANDS * sum(os.path.getsize(path) for path in missing)
-    free = shutil.disk_usage(work).free
-    if needed > free:
-        raise OSError(
-            f"{work}: about {needed / 1e9:.1f} GB are needed beside the inputs, and {free / 1e9:.1f} GB are free; name "
-            f"a folder on a larger disk ({BYTES_A_POINT} bytes a point, and the results)"
-        )
 
 
 def _prepare(engine: Engine, paths: Sequence[str], work: Path, options: Options) -> Plan:
@@ -216,49 +207,12 @@ def _check_parts(parts: Sequence[Part], options: Options) -> None:
                 f"{part.path}: its CRS ({(part.crs or 'none')[:60]}) is not that of {some[0].path} "
                 f"({(some[0].crs or 'none')[:60]}); transform it, or leave it out"
             )
-        if part.normals and options.viewpoint is None:
+        if part.normals != some[0].normals and options.viewpoint is None and options.orient != OUTWARD:
+            has, lacks = (part, some[0]) if part.normals else (some[0], part)
             raise ValueError(
-                f"{part.path}: has normals of its own, which would tell the outside, and tiles do not ask them; "
-                "give a viewpoint, or leave out nx, ny and nz"
+                f"{has.path}: has normals of its own (nx, ny, nz), which would tell the outside, and {lacks.path} has "
+                "none; give a viewpoint, or leave them out"
             )
-
-
-def _passes(engine: Engine, plan: Plan) -> None:
-    tiles = range(len(plan.tiles))
-    names = [f"x {t.low[0]:g} to {t.high[0]:g}, y {t.low[1]:g} to {t.high[1]:g}" for t in plan.tiles]
-    _raise_for(engine.run("measuring", _measure, [(plan.folder, tile) for tile in tiles]), "tile", names)
-    whole = merge_measures(plan)
-    _raise_for(engine.run("classifying", _classify, [(plan.folder, whole, tile) for tile in tiles]), "tile", names)
-    line = draw_line(plan, whole)
-    _raise_for(engine.run("linking", _link, [(plan.folder, whole, line, tile) for tile in tiles]), "tile", names)
-    merge_chains(plan)
-    _raise_for(engine.run("placing", _label, [(plan.folder, whole, line, tile) for tile in tiles]), "tile", names)
-
-
-def _measure(folder: Path, tile: int) -> None:
-    measure(Plan.read(folder), tile)
-
-
-def _classify(folder: Path, whole: Any, tile: int) -> None:
-    classify_tile(Plan.read(folder), whole, tile)
-
-
-def _link(folder: Path, whole: Any, line: Any, tile: int) -> None:
-    link_tile(Plan.read(folder), whole, line, tile)
-
-
-def _label(folder: Path, whole: Any, line: Any, tile: int) -> None:
-    label_tile(Plan.read(folder), whole, line, tile)
-
-
-def _raise_for(failed: dict[int, BaseException], what: str, names: Sequence[str]) -> None:
-    if failed:
-        error = next(iter(failed.values()))
-        where = "; ".join(f"{what} {n} ({names[n]})" for n in failed)
-        raise TileError(
-            f"{where} failed twice, the first with: {error!r:.300}; all others are done, and the same call does "
-            "what is missing"
-        ) from error
 
 
 def _count(plan: Plan) -> tuple[int, int]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
+
 from edgel._report.figures.compose import FigureImage, figure_image
 from edgel._report.figures.published import figure_1, figure_3, figure_4, figure_5
 from edgel._report.figures.views import figure_6, figure_8, figure_9
@@ -9,7 +11,13 @@ from edgel.cloud import Cloud
 from edgel.edges import Edges
 from edgel.paper import PaperEdges
 
-__all__ = ["FigureImage", "draw_figures"]
+__all__ = ["FigureImage", "check_drawing", "draw_figures"]
+
+
+def check_drawing() -> None:
+    """Raise an `ImportError` where Matplotlib, which sets the figures, is not installed."""
+    if find_spec("matplotlib") is None:
+        raise ImportError("figures need Matplotlib: pip install 'edgel[plot]', or pip install matplotlib")
 
 
 def draw_figures(

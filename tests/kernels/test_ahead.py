@@ -1,0 +1,68 @@
+"""Kernels compiled ahead: the list is that of the first jobs, and other processes compile what it names."""
+
+import subprocess
+import sys
+
+import first_jobs
+import numpy as np
+import pytest
+from numba import typeof
+
+from edgel._kernels import ahead
+from edgel._surface.forest import load_forests
+
+PROGRAM = """
+import inspect, sys, time
+from numba.core import event
+from edgel._kernels import ahead
+names = ["a", "b", "c", "d"]
+ahead.first_jobs = lambda: {"job": {f"work:{name}": "f8[1]" for name in names}}
+import numpy as np, work
+class Listener(event.Listener):
+    compiled = []
+    def on_start(self, event): self.compiled.append(event.data["dispatcher"].py_func.__name__)
+    def on_end(self, event): pass
+event.register("numba:compile", listener := Listener())
+work.a(np.ones(3))
+while len(ahead._begun) < len(names):
+    time.sleep(0.01)
+print([getattr(work, name)(np.ones(3)) for name in names], listener.compiled)
+"""
+
+
+def test_types_are_read_as_they_were_written():
+    trees = load_forests()["screen"].in_step
+    for value in (3, 2.0, True, np.float32(1), (1, 2), np.zeros((2, 3), np.float32), np.zeros(2, bool), trees):
+        assert ahead.types_of(ahead.words_of([typeof(value)])) == (typeof(value),)
+
+
+@pytest.mark.parametrize("job", first_jobs.JOBS)
+def test_the_list_is_what_the_first_jobs_need(job):
+    needed = dict(line.split(" ", 2)[1:] for line in first_jobs.lines(job))
+    assert needed == ahead.first_jobs()[job], "python tests/first_jobs.py writes the list anew"
+
+
+def test_other_processes_compile_what_this_one_has_not_begun(tmp_path, monkeypatch):
+    kernels = [f"@kernel\ndef {name}(x):\n    return x[0] + {number}\n" for number, name in enumerate("abcd")]
+    (tmp_path / "work.py").write_text("from edgel._kernels.parallel import kernel\n" + "\n".join(kernels))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    for threads, own in ("1", "['a', 'b', 'c', 'd']"), ("2", "['a"):
+        monkeypatch.setenv("EDGEL_NUM_THREADS", threads)
+        program = PROGRAM if threads == "2" else PROGRAM.replace("while len", "while False and len")
+        done = subprocess.run(
+            [sys.executable, "-B", "-c", program],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        assert done.stderr == ""
+        answers, compiled = done.stdout.split("] ")
+        assert answers == "[1.0, 2.0, 3.0, 4.0"
+        assert compiled.startswith(own)
+        assert len(list((tmp_path / "cache").rglob("*.nbc"))) == 4
+        for path in (tmp_path / "cache").rglob("*.nbc"):
+            path.unlink()
+    assert "'d'" not in compiled
