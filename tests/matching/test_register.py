@@ -213,7 +213,7 @@ def test_a_cloud_object_with_a_viewpoint_is_looked_through():
     assert np.mean(np.array(said[0]) == -1) > 0.95
     assert np.mean(np.array(said[1]) == 0) > 0.95
     assert np.mean(np.array(said[2]) == 1) > 0.9
-    assert look(sight, 1e3, 1e3, 10.0, 1.0) == 0
+    assert look(sight, 1e3, 1e3, 10.0, 1.0) == 2
     assert isinstance(scene, Cloud)
 
 

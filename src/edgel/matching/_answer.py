@@ -15,7 +15,8 @@ from edgel.matching._verify import EDGE, SURFACE, VISIBLE
 
 SURE = 0.1
 """Margin from which on an answer can be relied on: `docs/matching.md` says how often such answers are right."""
-_LEAST_SCORE, _LEAST_FIT = 0.1, 0.5  # parts that share nothing reach .19 and .47
+_LEAST_SCORE, _LEAST_FIT = 0.1, 0.5
+_FAR_AHEAD = 0.3  # margin that makes up for a small overlap: views of different parts reach .16, once .62
 _ORDERS = 15.0  # spacings of either cloud that the other has to be large
 _FEWEST_PLACES = 30
 _FEW_EDGES = 24  # half-edges of a search, with fewer of which the surface proposes poses
@@ -55,7 +56,7 @@ def _searched(match: Match, end: float) -> tuple[Found, str]:
     by_edges = None
     if min(len(match.few.turn), len(match.target.half)) >= _FEW_EDGES:
         by_edges = search(match, end)
-        if len(by_edges.poses) and not _doubt(by_edges):
+        if len(by_edges.poses) and not _doubt(by_edges, 1.0):
             return by_edges, "edges"
     by_surface = search(match, end, by_surface=True)
     if by_edges is None or not len(by_edges.poses):
@@ -83,7 +84,7 @@ def _answer(
     margin = 1.0 if not len(others) else float(np.clip((score - others[0]) / max(score, 1e-9), 0, 1))
     turned = found.poses if not swapped else np.linalg.inv(found.poses)
     alternatives = Poses(turned[1:], found.scores[1:])
-    doubt = _doubt(found)
+    doubt = _doubt(found, margin)
     if doubt:
         return not_found(doubt, stages.seconds, Poses(turned, found.scores))
     scale = np.append(np.full(3, 1 / radius_of(match.whole)), np.ones(3))
@@ -140,11 +141,14 @@ def _fitness(found: Found) -> float:
     return float(there[SURFACE] / max(there[VISIBLE], 1e-9))
 
 
-def _doubt(found: Found) -> str:
+def _doubt(found: Found, margin: float) -> str:
     """Say why the best pose is not believed; empty if it is."""
     score, fitness = float(found.scores[0]), _fitness(found)
     if fitness < _LEAST_FIT:
         return f"no pose is confirmed: the best lets {fitness:.0%} of the surface lie where it should, half is asked"
     if score < _LEAST_SCORE:
         return f"no pose is confirmed by edges and surface: the best scores {score:.2f}, {_LEAST_SCORE:g} is asked"
+    overlap = found.columns[0, 0, SURFACE]
+    if overlap < _LEAST_FIT and margin < _FAR_AHEAD:
+        return f"no pose is confirmed: the best lets {overlap:.0%} of the surface lie on the other, and is not alone"
     return ""

@@ -73,17 +73,17 @@ def _note(directions, ranges, near, far):
 
 @kernel
 def look(sight, x, y, z, tolerance):
-    """Say what a sensor makes of a place: -1 it looked through it, 1 it stands behind what was seen, else 0.
+    """Say what a sensor makes of a place: -1 it looked through it, 1 it stands behind what was seen, 2 unknown, else 0.
 
     Where it saw nothing nothing is known: surfaces that return no light are not empty space.
     """
     dx, dy, dz = x - sight.eye[0], y - sight.eye[1], z - sight.eye[2]
     away = np.sqrt(dx * dx + dy * dy + dz * dz)
     if away == 0.0:
-        return 0
+        return 2
     row, column = _pixel(sight.near.shape[0], dx, dy, dz)
     if not np.isfinite(sight.near[row, column]):
-        return 0
+        return 2
     if away < sight.near[row, column] - tolerance:
         return -1
     return 1 if away > sight.far[row, column] + tolerance else 0

@@ -149,6 +149,7 @@ def move(pose, place):
 
 @kernel
 def _confirm(start, stop, poses, probes, field, tolerance, columns):
+    has_sight = len(field.sight.near) > 1
     for p in range(start, stop):
         pose = poses[p]
         edge, missing, weight = 0.0, 0.0, 0.0
@@ -178,7 +179,7 @@ def _confirm(start, stop, poses, probes, field, tolerance, columns):
             seen = look(field.sight, x, y, z, 1.5 * tolerance)
             if seen < 0:
                 through += w
-            if seen <= 0:
+            if seen <= 0 or not has_sight:
                 visible += w
         columns[p, 0] = edge / weight if weight > 0.0 else 0.0
         columns[p, 1], columns[p, 2] = surface / share, through / share
@@ -194,7 +195,7 @@ def confirm(poses: np.ndarray, probes: Probes, field: Field, tolerance: float) -
     (P, 5) float64
         Shares, 0 to 1, by columns: `EDGE` of the edges found, `SURFACE` of the surface found, both by how near;
         `THROUGH` of the surface through which the other sensor looked; `MISSING` of the creases where the other surface
-        is smooth; `VISIBLE` of the surface not hidden behind what the other sensor saw.
+        is smooth; `VISIBLE` of the surface where the other sensor, if there is one, saw something no nearer.
     """
     columns = np.empty((len(poses), 5))
     run_slices(_confirm, len(poses), np.ascontiguousarray(poses), probes, field, tolerance, columns, size=16)
