@@ -4,7 +4,7 @@ VENV := .venv
 LOCK := --no-emit-index-url --no-header --python-version 3.11
 BIN := $(VENV)/bin
 
-.PHONY: demo test checked lint docs docs-serve release-check bench bench-quick install lock clean
+.PHONY: demo test checked lint docs docs-serve release-check bench bench-quick bench-register install lock clean
 
 demo: install
 	$(BIN)/edgel demo -o demo
@@ -42,6 +42,9 @@ bench: $(VENV)/installed-bench
 
 bench-quick: $(VENV)/installed-bench
 	$(BIN)/python benchmarks/bench.py --quick
+
+bench-register: $(VENV)/installed-bench
+	$(BIN)/python benchmarks/register.py
 
 $(VENV)/installed-bench: $(VENV)/installed requirements-bench.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --requirement requirements-bench.lock

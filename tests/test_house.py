@@ -17,7 +17,7 @@ FLOORS = [
     {"edges", "_kinds", "_faces", "_neighbors", "io"},
     {"_scale", "_surface", "_range_image", "_color", "paper", "plot", "synth", "metrics"},
     {"_labels", "_sides", "_detect", "_many", "_probabilities", "export"},
-    {"curves", "tiled"},
+    {"curves", "matching", "tiled"},
     {"_report"},
     {"_demo", "_viewer"},
     {"_cli"},

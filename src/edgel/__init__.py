@@ -4,7 +4,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from edgel import curves, paper
+    from edgel import curves, matching, paper
     from edgel._depth import from_depth
     from edgel._detect import detect
     from edgel._intrinsics import Intrinsics
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from edgel.cloud import Cloud
     from edgel.edges import EdgeKind, Edges
     from edgel.io import FormatError, FormatWarning, read, write
+    from edgel.matching import Model, Registration, register
 
 __version__ = "0.1.0"
 
@@ -26,15 +27,19 @@ __all__ = [
     "FormatError",
     "FormatWarning",
     "Intrinsics",
+    "Model",
     "Normals",
+    "Registration",
     "curves",
     "detect",
     "detect_many",
     "estimate_normals",
     "from_depth",
+    "matching",
     "paper",
     "probabilities",
     "read",
+    "register",
     "write",
 ]
 
@@ -48,16 +53,19 @@ _HOMES = {
     "FormatError": "edgel.io",
     "FormatWarning": "edgel.io",
     "Intrinsics": "edgel._intrinsics",
+    "Model": "edgel.matching",
     "Normals": "edgel._neighbors.normals",
+    "Registration": "edgel.matching",
     "detect": "edgel._detect",
     "detect_many": "edgel._many",
     "estimate_normals": "edgel._neighbors.estimate",
     "from_depth": "edgel._depth",
     "probabilities": "edgel._probabilities",
     "read": "edgel.io",
+    "register": "edgel.matching",
     "write": "edgel.io",
 }
-_ROOMS = ("cloud", "curves", "edges", "export", "io", "metrics", "paper", "plot", "synth")
+_ROOMS = ("cloud", "curves", "edges", "export", "io", "matching", "metrics", "paper", "plot", "synth")
 
 
 def __getattr__(name: str) -> Any:

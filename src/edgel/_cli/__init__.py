@@ -1,4 +1,4 @@
-"""The command line: ``edgel detect``, ``view``, ``render``, ``lines``, ``normals``, ``info``, ``convert``, and more."""
+"""The command line: ``edgel detect``, ``view``, ``render``, ``lines``, ``match``, ``normals`` and the others."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typer.core import TyperGroup
 from typer.exceptions import TyperException
 
 import edgel
-from edgel._cli import convert, demo, detect, info, lines, normals, render, view, warmup
+from edgel._cli import convert, demo, detect, info, lines, match, normals, render, view, warmup
 from edgel._cli.help import Command, help_text, without_type
 from edgel._cli.methods import MethodCommand
 from edgel.io.errors import printable
@@ -25,6 +25,7 @@ Examples:
   edgel detect *.laz -o edges/
   edgel render scan.ply -o edges.png
   edgel lines scan.ply -o drawing.dxf
+  edgel match scan.ply part.stl
   edgel view scan.ply
   edgel demo
 
@@ -100,5 +101,6 @@ app.command(cls=Command, help=help_text(info.HELP))(info.info)
 app.command(cls=Command, help=help_text(convert.HELP))(convert.convert)
 app.command(cls=MethodCommand, help=help_text(render.HELP))(render.render)
 app.command(cls=Command, help=help_text(lines.HELP))(lines.lines)
+app.command(cls=Command, help=help_text(match.HELP))(match.match)
 app.command(cls=Command, help=help_text(demo.HELP))(demo.demo)
 app.command(cls=Command, help=help_text(warmup.HELP))(warmup.warmup)

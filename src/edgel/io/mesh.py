@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from edgel.io.files import reading
 EXTENSIONS = (".ply", ".obj", ".stl", ".off")
 OFFER = "sample its surface: --sample-mesh 200000 (sample_mesh= in Python)"
 _MOST_POINTS = 100_000_000
+_HEAD = 65536  # bytes in which a PLY file's header ends
 
 
 def sample(path: str | os.PathLike[str], num_points: int) -> Cloud:
@@ -48,15 +50,42 @@ def sample(path: str | os.PathLike[str], num_points: int) -> Cloud:
     ...     len(sample(file, 50))
     50
     """
-    name = os.fspath(path)
     whole = isinstance(num_points, int | np.integer) and not isinstance(num_points, bool)
     if not whole or not 0 < num_points <= _MOST_POINTS:
         raise ValueError(
             f"sample_mesh: expected a number of points from 1 to {_MOST_POINTS}, got {printable(num_points, 40)}"
         )
+    mesh = load(path)
+    from trimesh.sample import sample_surface_even
+
+    points, faces = sample_surface_even(mesh, int(num_points), seed=0)
+    normals = np.asarray(mesh.triangles_cross[faces], np.float64)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    attributes = {axis: normals[:, i].astype(np.float32) for i, axis in enumerate(NORMALS)}
+    return Cloud(np.asarray(points, np.float64), attributes)
+
+
+def has_faces(path: str | os.PathLike[str]) -> bool:
+    """Tell whether a PLY or OBJ file is a mesh, by its header or its lines, without reading it whole for PLY."""
+    with open(path, "rb") as file:
+        if Path(path).suffix.lower() == ".obj":
+            return any(line.startswith(b"f ") for line in file)
+        head = file.read(_HEAD).split(b"end_header")[0]
+    counts = (line.split() for line in head.splitlines() if line.startswith(b"element face"))
+    return any(len(words) == 3 and words[2].isdigit() and int(words[2]) > 0 for words in counts)
+
+
+def load(path: str | os.PathLike[str]) -> Any:
+    """Read a mesh that has faces with an area, as a `trimesh.Trimesh`.
+
+    Raises
+    ------
+    FormatError
+        If the file is no mesh, is damaged, or trimesh is not installed.
+    """
+    name = os.fspath(path)
     try:
         import trimesh
-        from trimesh.sample import sample_surface_even
     except ImportError as error:
         raise FormatError(
             f"{name}: sampling a mesh needs trimesh; install it with `pip install edgel[mesh]`"
@@ -76,8 +105,4 @@ def sample(path: str | os.PathLike[str], num_points: int) -> Cloud:
         raise FormatError(f"{name}: has no faces to sample; its points are the cloud: leave --sample-mesh out")
     if not (np.isfinite(area) and area > 0):
         raise FormatError(f"{name}: the area of its faces is {area:g}; mend the mesh")
-    points, faces = sample_surface_even(mesh, int(num_points), seed=0)
-    normals = np.asarray(mesh.triangles_cross[faces], np.float64)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    attributes = {axis: normals[:, i].astype(np.float32) for i, axis in enumerate(NORMALS)}
-    return Cloud(np.asarray(points, np.float64), attributes)
+    return mesh
