@@ -7,8 +7,8 @@ clouds of your own put their points and labels in the place of `made`.
 """
 
 import numpy as np
-from sklearn.ensemble import RandomForestClassifier
-from sklearn.neighbors import NearestNeighbors
+from sklearn.ensemble import RandomForestClassifier  # pyright: ignore[reportMissingImports]
+from sklearn.neighbors import NearestNeighbors  # pyright: ignore[reportMissingImports]
 
 import edgel
 from edgel import synth

@@ -100,9 +100,7 @@ def _in_pyvista(edges: Edges, xyz: np.ndarray, _: Any) -> Any:
 
 def _in_viser(edges: Edges, xyz: np.ndarray, _: Any) -> Any:
     """A page of its own within the notebook's: nothing listens once it is made."""
-    from IPython.display import HTML
-
-    viser = _optional("viser")
+    viser, display = _optional("viser"), _optional("IPython.display")
     places = np.concatenate([edges.position, xyz, np.zeros((0 if len(edges) + len(xyz) else 1, 3))])
     low, high = places.min(axis=0), places.max(axis=0)
     scale = _WIDE / float((high - low).max() or 1.0)
@@ -116,7 +114,7 @@ def _in_viser(edges: Edges, xyz: np.ndarray, _: Any) -> Any:
         page = html.escape(server.scene.as_html(), quote=True)
         server.stop()
     frame = f'<iframe srcdoc="{page}" width="100%" height="480" title="The edge points" frameborder="0"></iframe>'
-    return HTML(f"<div>{frame}</div>")
+    return display.HTML(f"<div>{frame}</div>")
 
 
 def to_open3d(edges: Edges) -> Any:

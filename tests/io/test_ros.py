@@ -38,9 +38,9 @@ def header(store, seconds):
     return store.types["std_msgs/msg/Header"](stamp=time, frame_id="sensor", **more)
 
 
-def cloud2(store, records, *, padding=0, big=False, stamp=5):
+def cloud2(store, records: Any, *, padding=0, big=False, stamp=5):
     """A PointCloud2 of records (N,) or (H, W), with some bytes after every row."""
-    records: Any = np.atleast_2d(records)
+    records = np.atleast_2d(records)
     field = store.types["sensor_msgs/msg/PointField"]
     fields = []
     for name in records.dtype.names:

@@ -1,6 +1,7 @@
 """`edgel.register`: known poses come back, what is open is said, and what cannot be answered is not."""
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -186,7 +187,7 @@ def test_an_empty_cloud_is_refused(empty):
         ({"target_edges": "sideless"}, "nobody knows which side"),
     ],
 )
-def test_wrong_options_are_refused(options, message):
+def test_wrong_options_are_refused(options: Any, message):
     if options.get("source_edges") == "other":
         options = {"source_edges": edgel.detect(part()[:2000])}
     if options.get("target_edges") == "sideless":
@@ -208,8 +209,10 @@ def test_a_cloud_object_with_a_viewpoint_is_looked_through():
 
     scene = view((-0.48, 0.66, -0.58)).cloud
     seen = scene.xyz[np.isfinite(scene.xyz[:, 0])]
+    assert scene.viewpoint is not None
     sight = build_sight(seen, scene.viewpoint)
-    said = [[look(sight, *(share * p), 0.1 * SPACING + 0.5) for p in seen[::50]] for share in (0.9, 1.0, 1.1)]
+    near = 0.1 * SPACING + 0.5
+    said = [[look(sight, x, y, z, near) for x, y, z in share * seen[::50]] for share in (0.9, 1.0, 1.1)]
     assert np.mean(np.array(said[0]) == -1) > 0.95
     assert np.mean(np.array(said[1]) == 0) > 0.95
     assert np.mean(np.array(said[2]) == 1) > 0.9

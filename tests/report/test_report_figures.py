@@ -40,10 +40,12 @@ def test_figure_3_shows_the_edge_map_upright(written):
 @pytest.mark.usefixtures("small")
 def test_the_part_stands_beside_the_cloud(tee):
     with_part = cloud_and_projection(tee.cloud, tee.edges, tee.part)
+    assert with_part is not None
     assert [panel.title for panel in with_part.panels] == ["(a) the part", "(b) the cloud", "(c) its projection"]
     part, cloud = ((panel.image("light") < 255).any(axis=2).mean() for panel in with_part.panels[:2])
     assert part > 0.4
     without = cloud_and_projection(tee.cloud, tee.edges, None)
+    assert without is not None
     assert [panel.title for panel in without.panels] == ["(a) the cloud", "(b) its projection"]
     assert cloud_and_projection(tee.cloud, tee.other, None) is None
     assert cloud < (without.panels[0].image("light") < 255).any(axis=2).mean()  # there its points are drawn singly

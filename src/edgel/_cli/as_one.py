@@ -115,7 +115,7 @@ def _detect(
 ) -> Told:
     from edgel import tiled  # compiles what few need
 
-    wanted = {name: as_kinds(value) if name == "kinds" else value for name, value in given.items()}
+    wanted: dict[str, Any] = {name: as_kinds(value) if name == "kinds" else value for name, value in given.items()}
     if tiling.tile_points is not None:
         wanted["tile_points"] = int(tiling.tile_points)
     with failing_as(ExitCode.DATA, job.name, {*wanted, "workers"}):

@@ -14,7 +14,7 @@ from edgel._cli.jobs import Job
 from edgel._cli.outcome import Failed, Told, Work, attempt
 from edgel._cli.progress import Watch
 from edgel._cli.signals import Terminated, listen
-from edgel._kernels.parallel import num_threads
+from edgel._kernels.threads import num_threads
 
 _PATIENCE = 5.0  # seconds for a process to clear away what it began
 _processes = get_context("spawn")  # forks would inherit threads' locks

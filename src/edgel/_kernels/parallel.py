@@ -25,7 +25,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 _ANY_ORDER = {"reassoc", "nsz", "contract"}
 
 
-def _compiled(function: F, **options: Any) -> F:
+def _compiled(function: Callable[..., Any], **options: Any) -> Any:
     # Division by 0 gives infinity or NaN: a branch to an exception would keep every loop that divides off SIMD. Nothing
     # calls kernels from C.
     chosen: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, **options}

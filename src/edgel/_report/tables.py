@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from edgel._kernels.parallel import num_threads
+from edgel._kernels.threads import num_threads
 from edgel.edges import Edges
 from edgel.paper import PaperEdges
 

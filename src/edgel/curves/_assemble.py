@@ -176,7 +176,7 @@ def _vertices(strands: Strands, nodes: Nodes) -> tuple[np.ndarray, np.ndarray]:
     at = (np.arange(len(owner)) - start[owner]) / steps[owner]
     vertices = on_shapes(strands.shape[owner], low[owner] + at * span[owner])
     vertices[start[1:][strands.closed] - 1] = vertices[start[:-1][strands.closed]]
-    for run in np.flatnonzero(is_run):
+    for run in np.flatnonzero(is_run).tolist():
         path = strands.path_of(run)
         before, after = (nodes.position[nodes.of_end[run, end : end + 1][meets[run, end : end + 1]]] for end in (0, 1))
         vertices[start[run] : start[run + 1]] = np.concatenate([before, path, path[: int(strands.closed[run])], after])

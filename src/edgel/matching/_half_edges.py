@@ -108,7 +108,7 @@ def of_creases(
         into *= -np.sign((into * outside[:, other]).sum(axis=1, keepdims=True))  # away from where the other face looks
         halves.append(HalfEdges(places, frames_of(into, outside[:, face]), turn, bend.astype(np.int64)))
     both = join(halves)
-    return both.take(np.isfinite(both.frames).all(axis=(1, 2)))
+    return both.take(np.flatnonzero(np.isfinite(both.frames).all(axis=(1, 2))))
 
 
 def of_edges(

@@ -5,7 +5,8 @@ is said of the whole cloud is measured at a sample; each tile is classified with
 line and the chains across seams are merged; each file's edge points are written.
 """
 
-from edgel.tiled.run import Tiled, TileError, detect
+from edgel.tiled.passes import TileError
+from edgel.tiled.run import Tiled, detect
 from edgel.tiled.surroundings import is_run, surroundings
 
 __all__ = ["TileError", "Tiled", "detect", "is_run", "surroundings"]
