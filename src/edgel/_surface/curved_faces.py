@@ -29,7 +29,7 @@ _CURVATURE = 0.3  # of a face, in 1 / spacing: standard deviation of what is exp
 _FLOOR = 0.01  # spacings: residuals below say nothing
 _WEIGHT, _WEIGHT_SMALLER = 4.0, 1.0  # residuals that the noise of the first fit stands for in the others
 _BAND = 1.5  # standard deviations from the edge within which noise decides on which face a neighbour lies
-_LEAST = 4  # neighbours of a face
+_LEAST, _VAGUE = 4, 5.0  # neighbours of a face; spacings: an edge less sure could lie anywhere among them: not known
 _ROUNDS, _SETTLED = 5, 0.05  # standard deviations of the residuals
 _SUMS = 22  # of powers: see `_POWER`
 _POWER = np.array(  # which sum each product of two terms, and of a term with the height, is
@@ -67,7 +67,7 @@ def fit_curved_faces(first, places, squared, queries, targets, xyz, fits, max_aw
         divide_rows(vectors, spacing)
         outside(fits[targets[first + q]], spacing, start)
         copy_to(start, best)
-        noise, least, at, warm = 0.0, np.inf, COUNTS[0], False
+        noise, least, at, warm = 0.0, _VAGUE, COUNTS[0], False
         for count in COUNTS:
             near, weight = vectors[:, : min(count, k)], _WEIGHT if noise > 0.0 else 0.0
             sigma = _fit(near, best if warm else start, warm, noise, weight, max_away, min_turn, scratch, found)

@@ -27,7 +27,6 @@ _FLOOR = 0.05  # spacings: the outermost points lie no nearer to the rim
 _WEIGHT, _NOISE = 2.0, 0.3  # residuals that are expected, and how many of them that weighs as
 _LIFTED = 0.8  # of noise along the surface, which lifts the outermost points out of it: measured, 0.6 to 1.2
 _DEPTH = 1.25  # of outermost points inside the true end, over their spread: measured on random samples, 0.9 to 1.3
-_FARTHEST = 5.0  # spacings: a rim less sure than that could lie anywhere among the neighbours, and is not known
 _ASIDE = 2.0  # spacings from the line: farther ones belong to another rim
 
 
@@ -120,7 +119,7 @@ def _fit_rims(first, places, squared, queries, targets, xyz, normals, across, ri
             continue
         relative(places[q], queries, first + q, xyz, vectors)
         divide_rows(vectors, spacing)
-        least = _FARTHEST
+        least = np.inf
         for count in COUNTS:
             if count > places.shape[1]:
                 break
