@@ -82,8 +82,8 @@ def folder(tmp_path_factory):
 SHOWN = [line for command in COMMANDS for line in examples(run(command, "--help").stdout)]
 if (ROOT / "docs" / "command-line.md").is_file():
     SHOWN += re.findall(r"^\| `(edgel .+?)` \|", (ROOT / "docs" / "command-line.md").read_text(), re.MULTILINE)
-# They wait for someone, take half a minute, or want a scan of a part; each has tests of its own.
-LONG = ("edgel view", "edgel demo", "edgel warmup", "edgel match")
+# They wait for someone, take half a minute, want a scan of a part, or a result in tiles; each has tests of its own.
+LONG = ("edgel view", "edgel demo", "edgel warmup", "edgel match", "edgel lines out/")
 TRIED = [line for line in dict.fromkeys(SHOWN) if not line.startswith(LONG)]
 
 
