@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from alone import alone
 
 import edgel
 from edgel import synth
@@ -28,7 +29,7 @@ def wedge(up, swapped=False, flipped=(1, 1)):
     fit[0, hinge.LINE : hinge.LINE + 3] = 0, 1, 0
     fit[0, hinge.FOOT : hinge.FOOT + 3] = 0, 0, 0.5
     edge = np.empty((1, curved_faces.EDGE))
-    curved_faces.outside(fit[0].astype(np.float64), 1.0, edge[0])
+    alone(curved_faces.outside)(fit[0].astype(np.float64), 1.0, edge[0])
     return edge
 
 
