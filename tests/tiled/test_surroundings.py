@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import edgel
 from edgel import tiled
+from edgel._cli import app
+from edgel._cli.errors import ExitCode
 
 
 def test_curves_of_tiles_are_those_of_the_whole(files, strip, tmp_path):
@@ -19,6 +22,14 @@ def test_curves_of_tiles_are_those_of_the_whole(files, strip, tmp_path):
     assert len(mine) == len(whole) > 50
     first, second = (curves.vertices[np.lexsort(curves.vertices.round(5).T)] for curves in (mine, whole))
     np.testing.assert_allclose(first, second, atol=1e-6)
+
+    table = tmp_path / "lines.csv"
+    result = CliRunner().invoke(app, ["lines", str(out), "-o", str(table)])
+    assert result.exit_code == 0, result.output
+    assert len(table.read_text().splitlines()) == 1 + len(mine)
+    refused = CliRunner().invoke(app, ["lines", str(out), "-o", str(table), "--kinds", "crease"])
+    assert refused.exit_code == ExitCode.USAGE
+    assert "leave it out" in refused.stderr
 
 
 def test_a_run_whose_state_is_gone_is_named(tmp_path):
