@@ -1,12 +1,13 @@
 """Kernels compiled ahead: the list is that of the first jobs, and other processes compile what it names."""
 
+import os
 import subprocess
 import sys
 
 import first_jobs
 import numpy as np
 import pytest
-from numba import config, typeof
+from numba import typeof
 
 from edgel._kernels import ahead
 from edgel._surface.forest import load_forests
@@ -36,7 +37,7 @@ def test_types_are_read_as_they_were_written():
         assert ahead.types_of(ahead.words_of([typeof(value)])) == (typeof(value),)
 
 
-@pytest.mark.skipif(bool(config.BOUNDSCHECK), reason="kernels whose indices are checked are not those of users")
+@pytest.mark.skipif(bool(os.environ.get("NUMBA_BOUNDSCHECK")), reason="kernels whose indices are checked are not those of users")
 @pytest.mark.parametrize("job", first_jobs.JOBS)
 def test_the_list_is_what_the_first_jobs_need(job):
     needed = dict(line.split(" ", 2)[1:] for line in first_jobs.lines(job))
