@@ -37,7 +37,9 @@ def test_types_are_read_as_they_were_written():
         assert ahead.types_of(ahead.words_of([typeof(value)])) == (typeof(value),)
 
 
-@pytest.mark.skipif(bool(os.environ.get("NUMBA_BOUNDSCHECK")), reason="kernels whose indices are checked are not those of users")
+@pytest.mark.skipif(
+    bool(os.environ.get("NUMBA_BOUNDSCHECK")), reason="kernels whose indices are checked are not those of users"
+)
 @pytest.mark.parametrize("job", first_jobs.JOBS)
 def test_the_list_is_what_the_first_jobs_need(job):
     needed = dict(line.split(" ", 2)[1:] for line in first_jobs.lines(job))
