@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 import edgel
 from edgel import synth
 from edgel._cli import app
+from edgel._cli.errors import ExitCode
 
 SPACING = 1.6
 
@@ -18,6 +19,16 @@ def run(*words):
     result = CliRunner().invoke(app, [str(word) for word in words])
     assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
     return result
+
+
+@pytest.mark.parametrize("part", ["missing.stl", "missing.ply", "broken.ply"])
+def test_a_part_that_cannot_be_read_is_named(tmp_path, part):
+    edgel.write(tmp_path / "scan.ply", synth.sample(synth.stepped_block(), spacing=6.0).cloud)
+    (tmp_path / "broken.ply").write_text("no PLY")
+    done = run("match", tmp_path / "scan.ply", tmp_path / part)
+    assert done.exit_code == ExitCode.INPUT
+    assert part in done.stderr
+    assert "internal" not in done.stderr
 
 
 @pytest.fixture(scope="module")

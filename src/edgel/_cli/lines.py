@@ -121,9 +121,11 @@ def lines(
         condition = None if where is None else Where(where)
         drawing: dict[str, Any] = {"view": view, "unit": unit, "scale": scale}
         reading = files.Reading(intrinsics, columns, sample_mesh, topic)
-        wanted = _Wanted(reading, condition, check_options("auto", given), tolerance, square, drawing)
-        if len(sources) == 1 and is_run(sources[0]):
-            _check_tiled(options.given(kinds=kinds, min_strength=min_strength, where=where, viewpoint=viewpoint))
+        in_tiles = len(sources) == 1 and is_run(sources[0])
+        wanted = _Wanted(reading, in_tiles, condition, check_options("auto", given), tolerance, square, drawing)
+        if in_tiles:
+            finding = options.given(kinds=kinds, min_strength=min_strength, where=where, viewpoint=viewpoint)
+            _check_tiled(finding | options.given(**vars(reading)))
             todo = [Job(sources[0], output, report, no_clobber=clobber is False)]
         else:
             todo = jobs.plan(sources, reading, output=output, known=list(WRITERS), report=report, clobber=clobber)
@@ -135,6 +137,7 @@ class _Wanted:
     """What is asked for of each cloud."""
 
     reading: files.Reading
+    in_tiles: bool
     where: Where | None
     given: dict[str, Any]
     tolerance: float | None
@@ -148,7 +151,7 @@ def _draw(wanted: _Wanted, job: Job, progress: Callable[[str], None]) -> Told:
     files.check_file(output, no_clobber=job.no_clobber, among=job.among)
     files.check_not_input(output, [job.source, wanted.reading.intrinsics])
     stages = Stages(progress)
-    if is_run(job.source):
+    if wanted.in_tiles:
         with stages("reading"), failing_as(ExitCode.DATA, job.source):
             cloud, edges = surroundings(job.source)
         found = Found(cloud, cloud, edges)
@@ -188,7 +191,7 @@ def _draw(wanted: _Wanted, job: Job, progress: Callable[[str], None]) -> Told:
 
 
 def _check_tiled(given: dict[str, Any]) -> None:
-    """Raise a `Failure` for options that say how edges are found, where they have been found already."""
+    """Raise a `Failure` for options that say how clouds are read or edges found, where they have been found already."""
     for name in given:
         raise Failure(ExitCode.USAGE, f"{as_option(name)}: is for edges that are yet to be found; leave it out here")
 

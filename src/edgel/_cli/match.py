@@ -79,8 +79,11 @@ def match(
         if most < 1:
             raise Failure(ExitCode.USAGE, f"--most: expected 1 or more, got {most}")
         reading = files.Reading(intrinsics, columns)
-        wanted = _Wanted(reading, part, drawing, most, scale, viewpoint)
-        if not _is_model(part) and (most > 1 or scale != 1):
+        files.check_input(part, files.Reading())
+        with failing_as(ExitCode.INPUT, part):
+            is_model = _is_model(part)
+        wanted = _Wanted(reading, part, is_model, drawing, most, scale, viewpoint)
+        if not is_model and (most > 1 or scale != 1):
             raise Failure(ExitCode.USAGE, f"{part}: --most and --scale are for meshes and STEP files; this is a cloud")
         todo = jobs.plan([source], reading, output=output, clobber=clobber)
         if len(todo) > 1:
@@ -94,6 +97,7 @@ class _Wanted:
 
     reading: files.Reading
     part: str
+    is_model: bool
     drawing: str | None
     most: int
     scale: float
@@ -102,7 +106,6 @@ class _Wanted:
 
 def _match(wanted: _Wanted, job: Job, progress: Callable[[str], None]) -> Told:
     jobs.check_job(job, wanted.reading, "the part in place")
-    files.check_input(wanted.part, files.Reading())
     if wanted.drawing is not None:
         files.check_extension(wanted.drawing, [".png"])
         files.check_file(wanted.drawing, no_clobber=job.no_clobber)
@@ -111,7 +114,7 @@ def _match(wanted: _Wanted, job: Job, progress: Callable[[str], None]) -> Told:
         scan = files.read_cloud(job.source, wanted.reading)
         scan = scan if wanted.viewpoint is None else replace(scan, viewpoint=np.array(wanted.viewpoint))
         with failing_as(ExitCode.INPUT, wanted.part):
-            part = Model(wanted.part, scale=wanted.scale) if _is_model(wanted.part) else files.read_cloud(wanted.part)
+            part = Model(wanted.part, scale=wanted.scale) if wanted.is_model else files.read_cloud(wanted.part)
     with stages("matching"), failing_as(ExitCode.DATA, job.source):
         found = part.find(scan, most=wanted.most) if isinstance(part, Model) else [register(part, scan)]
     if not found or not found[0].found:

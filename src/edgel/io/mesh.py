@@ -12,11 +12,11 @@ from edgel._objects import NORMALS
 from edgel.cloud import Cloud
 from edgel.io.errors import FormatError, printable
 from edgel.io.files import reading
+from edgel.io.ply_header import read_header
 
 EXTENSIONS = (".ply", ".obj", ".stl", ".off")
 OFFER = "sample its surface: --sample-mesh 200000 (sample_mesh= in Python)"
 _MOST_POINTS = 100_000_000
-_HEAD = 65536  # bytes in which a PLY file's header ends
 
 
 def sample(path: str | os.PathLike[str], num_points: int) -> Cloud:
@@ -66,13 +66,18 @@ def sample(path: str | os.PathLike[str], num_points: int) -> Cloud:
 
 
 def has_faces(path: str | os.PathLike[str]) -> bool:
-    """Tell whether a PLY or OBJ file is a mesh, by its header or its lines, without reading it whole for PLY."""
+    """Tell whether a PLY or OBJ file is a mesh, by its header or its lines, without reading it whole for PLY.
+
+    Raises
+    ------
+    FormatError
+        If the header of a PLY file is damaged.
+    """
     with open(path, "rb") as file:
         if Path(path).suffix.lower() == ".obj":
-            return any(line.startswith(b"f ") for line in file)
-        head = file.read(_HEAD).split(b"end_header")[0]
-    counts = (line.split() for line in head.splitlines() if line.startswith(b"element face"))
-    return any(len(words) == 3 and words[2].isdigit() and int(words[2]) > 0 for words in counts)
+            return any(line.split(None, 1)[:1] == [b"f"] for line in file)
+        elements = read_header(os.fspath(path), file).elements
+    return any(element.name == "face" and element.count > 0 for element in elements)
 
 
 def load(path: str | os.PathLike[str]) -> Any:
@@ -87,9 +92,7 @@ def load(path: str | os.PathLike[str]) -> Any:
     try:
         import trimesh
     except ImportError as error:
-        raise FormatError(
-            f"{name}: sampling a mesh needs trimesh; install it with `pip install edgel[mesh]`"
-        ) from error
+        raise FormatError(f"{name}: meshes need trimesh; install it with `pip install edgel[mesh]`") from error
     try:
         with reading(path) as file:
             # Neither materials nor merged vertices are of use here, nor is any other file that it names read.
@@ -102,7 +105,7 @@ def load(path: str | os.PathLike[str]) -> Any:
             f"{name}: no mesh that trimesh reads ({error or type(error).__name__}); get it again"
         ) from None
     if not num_faces:
-        raise FormatError(f"{name}: has no faces to sample; its points are the cloud: leave --sample-mesh out")
+        raise FormatError(f"{name}: has no faces; its points are a cloud: read it as one (without --sample-mesh)")
     if not (np.isfinite(area) and area > 0):
         raise FormatError(f"{name}: the area of its faces is {area:g}; mend the mesh")
     return mesh

@@ -16,7 +16,7 @@ from edgel.tiled.aside import made_aside
 from edgel.tiled.plan import Options
 from edgel.tiled.spool import hash_of
 
-_FILE = "manifest.json"
+FILE = "manifest.json"
 
 
 def check_manifest(folder: Path, files: Sequence[str], options: Options) -> list[str]:
@@ -32,7 +32,7 @@ def check_manifest(folder: Path, files: Sequence[str], options: Options) -> list
         "options": json.loads(json.dumps(asdict(options))),
         "inputs": [_stamp(file) for file in files],
     }
-    path, cpu = folder / _FILE, llvmlite.binding.get_host_cpu_name()
+    path, cpu = folder / FILE, llvmlite.binding.get_host_cpu_name()
     if not path.exists():
         stored = {**wanted, "cpus": [cpu]}
     else:

@@ -19,7 +19,7 @@ from edgel.io.files import stem
 from edgel.tiled.aside import clear_stale
 from edgel.tiled.disk import check_before
 from edgel.tiled.engine import Engine, start
-from edgel.tiled.manifest import check_manifest
+from edgel.tiled.manifest import FILE, check_manifest
 from edgel.tiled.output import edges_of, write_index, write_part
 from edgel.tiled.passes import TileError, find_edges, raise_for
 from edgel.tiled.plan import Options, Plan, cut, origin_left_out
@@ -108,8 +108,8 @@ def detect(
     ------
     FileNotFoundError, FormatError, ValueError
         If a file cannot be read, lies in another frame (CRS) than the first, or is a view of its own; if the cloud is
-        one that tiles cannot answer (much noise, color edges, normals of its own without a viewpoint); if the folder
-        holds results of something else; if the disk is too small. The message names the file and the remedy.
+        one that tiles cannot answer (much noise, color edges, normals in some files alone and no viewpoint); if the
+        folder holds results of something else; if the disk is too small. The message names the file and the remedy.
     TileError
         If a tile failed twice; the others are done, and the same call does what is missing.
 
@@ -134,7 +134,7 @@ def detect(
     outputs = _outputs(paths, folder, extension)
     if overwrite:
         shutil.rmtree(folder / "work", ignore_errors=True)
-        (folder / "manifest.json").unlink(missing_ok=True)
+        (folder / FILE).unlink(missing_ok=True)
     work = folder / "work"
     work.mkdir(parents=True, exist_ok=True)
     notices = check_manifest(folder, paths, options)
