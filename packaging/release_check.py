@@ -34,7 +34,6 @@ SCHEMAS = {
     "readthedocs": ".readthedocs.yaml",
 }
 LEAST_RATING = 8  # of pyroma's 10: for the rest it asks for an address of electronic mail, of which there is none
-ON_CONDA = {"matplotlib": "matplotlib-base"}  # names that differ there
 SERVED = 60.0  # seconds that the viewer may take to answer
 
 
@@ -96,7 +95,7 @@ def agree() -> None:
     listed = {row.split()[0]: row for row in recipe["requirements"]["run"]}
     for name, row in needed.items():
         least = row.split(">=")[1]
-        if listed.get(ON_CONDA.get(name, name), "").split(">=")[-1] != least:
+        if listed.get(name, "").split(">=")[-1] != least:
             wrong.append(f"packaging/recipe.yaml: {name} is not >={least}")
     if wrong:
         raise SystemExit("\n".join(wrong))

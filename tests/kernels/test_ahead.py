@@ -8,8 +8,12 @@ import first_jobs
 import numpy as np
 import pytest
 from numba import typeof
+from typer.testing import CliRunner
 
+from edgel._cli import app
+from edgel._cli.errors import ExitCode
 from edgel._kernels import ahead
+from edgel._kernels.cache import KernelCache
 from edgel._surface.forest import load_forests
 
 PROGRAM = """
@@ -70,3 +74,17 @@ def test_other_processes_compile_what_this_one_has_not_begun(tmp_path, monkeypat
         for path in (tmp_path / "cache").rglob("*.nbc"):
             path.unlink()
     assert "'d'" not in compiled
+
+
+def test_warming_up_compiles_what_is_listed_and_says_where_it_cannot_be_kept(monkeypatch):
+    compiled = []
+    monkeypatch.setattr(ahead, "first_jobs", lambda: {"one": {"a:b": "f8[1]", "a:c": "i8"}, "two": {"a:b": "f8[1]"}})
+    monkeypatch.setattr(ahead, "_compile", lambda *kernel: compiled.append(kernel))
+    done = CliRunner().invoke(app, ["warmup"])
+    assert done.exit_code == 0, done.output
+    assert "kernels are ready" in done.output
+    assert compiled == [("a:b", "f8[1]"), ("a:c", "i8")]
+    monkeypatch.setattr(KernelCache, "keeps", False)
+    done = CliRunner().invoke(app, ["warmup"])
+    assert done.exit_code == ExitCode.OUTPUT
+    assert "NUMBA_CACHE_DIR" in done.stderr

@@ -68,7 +68,6 @@ def test_a_sensor_tells_the_outside_in_tiles_too(files, strip, tmp_path):
 def test_the_outside_of_a_whole_surface_is_told_in_tiles(tmp_path, tile_points):
     solid = synth.sample(synth.stepped_block(), pattern="blue_noise", spacing=0.9, noise=0.05, seed=3)
     xyz = np.concatenate([solid.cloud.xyz, solid.cloud.xyz + [90.0, 4.0, 0.0]])
-    wanted = edgel.detect(xyz, method="surface", orient="outward")
     names = [str(tmp_path / f"{number}.npy") for number in range(2)]
     for name, part in zip(names, (xyz[::2], xyz[1::2]), strict=True):
         np.save(name, part)

@@ -9,7 +9,7 @@ from edgel._neighbors.kdtree import NeighborIndex, build_index
 from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.neighborhood import relative
 from edgel._neighbors.normals import fit_planes
-from edgel._neighbors.queries import at_places
+from edgel._neighbors.queries import at_places, every_point
 from edgel._neighbors.spacing import disc_spacing
 from edgel._surface import plane_scales
 from edgel._surface.plane_scales import SCALES, fit_scales
@@ -18,7 +18,6 @@ NEIGHBORS = 24  # of the plane that a point is moved onto, the point among them
 FROM, ALL = 0.26, 0.32  # noise, as `cloud_noise` measures it, up to which nothing moves, and from which on all the way
 SAMPLE = 4_000  # points that the noise is measured at
 _NEAR = 3  # neighbours that tell noise: of a point on a thin plate they lie on its own side
-_BLOCK = 65_536  # points whose planes exist at a time
 _STEP = 0.02  # what noise is rounded to: no answer shall hang on which points were sampled
 
 
@@ -31,14 +30,10 @@ def smoothed(index: NeighborIndex) -> NeighborIndex:
     share = share_of(cloud_noise(index))
     if share == 0.0:
         return index
-    moved = np.empty((len(index), 3))
-    for start in range(0, len(index), _BLOCK):
-        places = np.arange(start, min(start + _BLOCK, len(index)))
-        planes, xyz = fit_planes(index, at_places(index, places), NEIGHBORS), index.at(places)
-        off = (xyz * planes.normals).sum(axis=1) - planes.offset
-        there = xyz - share * off[:, None] * planes.normals
-        moved[index.order[places]] = np.where(np.isfinite(there), there, xyz)
-    return build_index(moved)
+    planes, xyz = fit_planes(index, every_point(index), NEIGHBORS), index.by_point()
+    off = (xyz * planes.normals).sum(axis=1) - planes.offset
+    moved = xyz - share * off[:, None] * planes.normals
+    return build_index(np.where(np.isfinite(moved), moved, xyz))
 
 
 def share_of(noise: float) -> float:

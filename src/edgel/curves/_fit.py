@@ -18,4 +18,4 @@ NONE, EDGE_ALONE, MEASURED = 0, 1, 2
 
 UNKNOWNS = 10
 """Tilt of the axis (2), place of the origin across it (2), radius, height, turn of both faces (2), their bends (2)."""
-TILT, CENTRE, SIZE, HEIGHT, TURN, BENT = 0, 2, 4, 5, 6, 8
+CENTRE, SIZE, HEIGHT, TURN, BENT = 2, 4, 5, 6, 8

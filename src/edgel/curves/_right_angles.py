@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from edgel._kernels.union_find import join
 from edgel.curves._curves import CurveKind, Curves
 
 _FREE = 1e-6  # weight of where a node was, over that of a line through it
@@ -63,17 +64,9 @@ def right_angles(curves: Curves, within: float) -> Curves:
 
 
 def _groups(nodes: np.ndarray, count: int) -> np.ndarray:
-    """Number the groups of lines (L,) that share nodes (L, 2)."""
-    group = np.arange(len(nodes))
-    while True:
-        least = np.full(count + 1, len(nodes))  # the last stands for no node
-        for end in (0, 1):
-            np.minimum.at(least, nodes[:, end], group)
-        least[-1] = len(nodes)
-        lower = np.minimum(group, least[nodes].min(axis=1, initial=len(nodes)))
-        if (lower == group).all():
-            return np.unique(group, return_inverse=True)[1]
-        group = lower
+    """Number the groups of lines (L,) that share nodes (L, 2) of `count`."""
+    line, end = np.nonzero(nodes >= 0)
+    return join(len(nodes) + count, line, len(nodes) + nodes[line, end])[: len(nodes)]
 
 
 def _meeting_places(curves: Curves, lines: np.ndarray, middle: np.ndarray, way: np.ndarray) -> np.ndarray:

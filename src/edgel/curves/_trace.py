@@ -28,7 +28,8 @@ def trace(points: Any, edges: Edges) -> Curves:
     Parameters
     ----------
     points : (N, 3) or (H, W, 3) array_like, Cloud, or an object that carries points
-        The cloud in which the edges were found. Only the points within about 6 spacings of edge points are looked at.
+        The cloud in which the edges were found. Points more than about 6 spacings from edge points are
+        looked at only where an arc may go on beyond its own.
     edges : Edges
         Best with faint ones, ``edgel.detect(points, min_strength=edgel.curves.FAINT)``. The far side of a jump and the
         frame of what a sensor sees are left out.

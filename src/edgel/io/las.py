@@ -69,13 +69,8 @@ def read_chunks(path: str | os.PathLike[str], rows: int) -> Iterator[Cloud]:
         As `read`; of what is wrong with the points, when they are reached.
     """
     with _opened(path) as (name, reader):
-        names, found = list(reader.header.point_format.dimension_names), 0
-        for points in reader.chunk_iterator(rows):
-            found += len(points)
-            yield _cloud(name, reader.header, {column: np.array(points[column]) for column in names})
-        _check_count(name, reader.header, found)
-        if not found:
-            yield _cloud(name, reader.header, _no_columns(reader.header))
+        for columns in _column_chunks(name, reader, rows):
+            yield _cloud(name, reader.header, columns)
 
 
 def count_rows(path: str | os.PathLike[str]) -> int | None:
@@ -151,16 +146,19 @@ def _check_size(path: str, header: laspy.LasHeader, size: int) -> None:
 
 
 def _read_columns(path: str, reader: laspy.LasReader) -> dict[str, np.ndarray]:
-    names = list(reader.header.point_format.dimension_names)
-    parts: dict[str, list[np.ndarray]] = {name: [] for name in names}
-    for points in reader.chunk_iterator(_CHUNK):
-        for name in names:
-            parts[name].append(np.array(points[name]))
-    found = sum(map(len, parts["X"]))
+    parts = list(_column_chunks(path, reader, _CHUNK))
+    return parts[0] if len(parts) == 1 else {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def _column_chunks(path: str, reader: laspy.LasReader, rows: int) -> Iterator[dict[str, np.ndarray]]:
+    """Read the columns of so many rows at a time; at least once, empty where the file is."""
+    names, found = list(reader.header.point_format.dimension_names), 0
+    for points in reader.chunk_iterator(rows):
+        found += len(points)
+        yield {name: np.array(points[name]) for name in names}
     _check_count(path, reader.header, found)
     if not found:
-        return _no_columns(reader.header)
-    return {name: arrays[0] if len(arrays) == 1 else np.concatenate(arrays) for name, arrays in parts.items()}
+        yield _no_columns(reader.header)
 
 
 def _check_count(path: str, header: laspy.LasHeader, found: int) -> None:

@@ -60,13 +60,7 @@ def read(path: str | os.PathLike[str]) -> Cloud:
         header = read_header(name, file)
         body = {"ascii": _read_ascii, "binary": _read_plain, "binary_compressed": _read_compressed}[header.data]
         xyz, fields = body(name, file, header)
-    attributes: dict[str, np.ndarray] = {}
-    spelled = {field: name for field, name in standard_names([*fields]).items() if name in NORMALS}
-    for field, values in fields.items():
-        if field.lower() in ("rgb", "rgba") and values.ndim == 1 and values.dtype.itemsize == 4:
-            attributes.update(unpack_colors(values, with_alpha=field.lower() == "rgba"))
-        else:
-            attributes[spelled.get(field, field)] = values
+    attributes = attributes_of(fields)
     shape = (header.height, header.width) if min(header.height, header.width) > 1 else None
     viewpoint = np.array(header.viewpoint[:3]) if header.viewpoint else None
     if viewpoint is not None and shape is None and not viewpoint.any():
@@ -153,7 +147,19 @@ def _read_compressed(path: str, file: BinaryIO, header: Header) -> tuple[np.ndar
     return xyz, {name: values.astype(values.dtype.newbyteorder("="), copy=True) for name, values in kept.items()}
 
 
-def unpack_colors(packed: np.ndarray, *, with_alpha: bool) -> dict[str, np.ndarray]:
+def attributes_of(fields: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Name fields as attributes are: normals by the names of ours, packed colors unpacked."""
+    attributes: dict[str, np.ndarray] = {}
+    spelled = {field: name for field, name in standard_names([*fields]).items() if name in NORMALS}
+    for field, values in fields.items():
+        if field.lower() in ("rgb", "rgba") and values.ndim == 1 and values.dtype.itemsize == 4:
+            attributes.update(_unpack_colors(values, with_alpha=field.lower() == "rgba"))
+        else:
+            attributes[spelled.get(field, field)] = values
+    return attributes
+
+
+def _unpack_colors(packed: np.ndarray, *, with_alpha: bool) -> dict[str, np.ndarray]:
     bits = np.ascontiguousarray(packed).view(np.uint32)
     shifts = {"red": 16, "green": 8, "blue": 0, "alpha": 24}
     channels = {name: (bits >> shift & 255).astype(np.uint8) for name, shift in shifts.items()}

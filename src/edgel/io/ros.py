@@ -16,12 +16,11 @@ from typing import Any
 import numpy as np
 
 from edgel._depth import from_depth
-from edgel._objects import NORMALS, find_xyz
+from edgel._objects import find_xyz
 from edgel.cloud import Cloud
 from edgel.io.errors import FormatError, printable
 from edgel.io.files import check_readable
-from edgel.io.names import standard_names
-from edgel.io.pcd import unpack_colors
+from edgel.io.pcd import attributes_of
 
 EXTENSIONS = (".mcap", ".bag", ".db3")
 _CLOUD, _IMAGE, _CAMERA = "sensor_msgs/msg/PointCloud2", "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo"
@@ -206,17 +205,8 @@ def _cloud_of(name: str, message: Any) -> Cloud:
     axes = find_xyz(names)
     if axes is None:
         raise FormatError(f"{name}: a PointCloud2 without x, y and z: {', '.join(map(printable, names))}")
-    spelled = {old: new for old, new in standard_names(names).items() if new in NORMALS}
-    attributes: dict[str, np.ndarray] = {}
-    for field in names:
-        values = records[field]
-        if field in axes:
-            continue
-        values = values.astype(values.dtype.newbyteorder("="))
-        if field.lower() in ("rgb", "rgba") and values.ndim == 1 and values.dtype.itemsize == 4:
-            attributes |= unpack_colors(values, with_alpha=field.lower() == "rgba")
-        else:
-            attributes[spelled.get(field, field)] = values
+    others = {name: records[name] for name in names if name not in axes}
+    attributes = attributes_of({name: part.astype(part.dtype.newbyteorder("=")) for name, part in others.items()})
     xyz = np.column_stack([records[axis].astype(np.float64) for axis in axes])
     organized = height > 1 and width > 1
     return Cloud(xyz, attributes, (height, width) if organized else None, np.zeros(3) if organized else None)

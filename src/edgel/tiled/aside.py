@@ -47,8 +47,8 @@ def _lives(process: int) -> bool:
         os.kill(process, 0)
     except ProcessLookupError:
         return False
-    except (PermissionError, OSError):  # somebody else's
-        return True
+    except OSError:  # somebody else's
+        pass
     return True
 
 

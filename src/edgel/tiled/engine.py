@@ -38,7 +38,7 @@ class Engine:
 
         `check` is called when the first is done, and whenever twice as many are: what it raises ends the run.
         """
-        failed = dict(self._attempt(what, task, dict(enumerate(jobs)), check))
+        failed = self._attempt(what, task, dict(enumerate(jobs)), check)
         for number in failed.copy():
             del failed[number]
             failed |= self._attempt(f"{what}, again", task, {number: jobs[number]})
@@ -50,18 +50,18 @@ class Engine:
         task: Callable[..., Any],
         jobs: dict[int, tuple[Any, ...]],
         check: Callable[[], None] | None = None,
-    ) -> Iterator[tuple[int, BaseException]]:
+    ) -> dict[int, BaseException]:
         begin = time.monotonic()
         finish = self._by_dask(task, jobs) if self.client is not None else _here(task, jobs)
-        failed = []
+        failed = {}
         for done, (number, error) in enumerate(finish, start=1):
             left = (time.monotonic() - begin) / done * (len(jobs) - done)
             self.progress(f"{what}: {done} of {len(jobs)}, about {left:.0f} s left")
             if error is not None:
-                failed.append((number, error))
+                failed[number] = error
             if check is not None and done & (done - 1) == 0:
                 check()
-        return iter(failed)
+        return failed
 
     def _by_dask(
         self, task: Callable[..., Any], jobs: dict[int, tuple[Any, ...]]
