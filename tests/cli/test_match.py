@@ -102,6 +102,8 @@ def test_what_is_not_there_is_not_found(folder):
         (("scan.pcd", "part.stl", "--most", "0"), 2, "--most"),
         (("scan.pcd", "ball.ply", "--most", "2"), 2, "for meshes and STEP"),
         (("scan.pcd", "part.stl", "--picture", "a.jpg"), 2, "png"),
+        (("scan.pcd", "part.ply", "-o", "part.ply"), 2, "is the input itself"),
+        (("scan.pcd", "part.ply", "--picture", "part.ply"), 2, "is the input itself"),
     ],
 )
 def test_wrong_words(folder, monkeypatch, words, code, message):

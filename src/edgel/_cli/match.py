@@ -106,7 +106,10 @@ class _Wanted:
 
 def _match(wanted: _Wanted, job: Job, progress: Callable[[str], None]) -> Told:
     jobs.check_job(job, wanted.reading, "the part in place")
+    if job.output is not None:
+        files.check_not_input(job.output, [wanted.part])
     if wanted.drawing is not None:
+        files.check_not_input(wanted.drawing, [job.source, wanted.part, wanted.reading.intrinsics])
         files.check_extension(wanted.drawing, [".png"])
         files.check_file(wanted.drawing, no_clobber=job.no_clobber)
     stages = Stages(progress)
