@@ -1,7 +1,7 @@
 """Registration: how often the right pose is found, how near, how surely, and at what cost, beside rivals.
 
 Run: make bench-register, or python benchmarks/register.py [--pairs 100] [--noise 0.3 0.5] [--rows "view to view" ...]
-[--no-rivals] [--held 1] [--output register.json]. A pair is right by less than 5 degrees and 5 spacings (`register_pairs`). Times are
+[--no-rivals] [--held 1] [--output register.jsonl]. A pair is right by less than 5 degrees and 5 spacings (`register_pairs`). Times are
 CPU seconds of the whole process, detection included, rivals' ICP included. Rivals have two voxel sizes; that which is right
 more often in a row counts there. What is done already, by an output that is there, is not done again.
 """
@@ -63,8 +63,7 @@ def measure(pair: pairs.Pair, run: Callable[..., Any], *arguments: Any) -> dict[
     if not isinstance(answer, edgel.Registration):
         degrees, shift = pairs.errors(pair, answer)
         return {"degrees": degrees, "shift": shift, "seconds": seconds}
-    tried = answer.T_target_source if answer.found else np.full((4, 4), np.nan)
-    degrees, shift = pairs.errors(pair, tried) if answer.found else (180.0, 1e3)
+    degrees, shift = pairs.errors(pair, answer.T_target_source) if answer.found else (180.0, 1e3)
     row = {"degrees": degrees, "shift": shift, "seconds": seconds, "found": answer.found, "margin": answer.margin}
     return row | {"std": answer.position_std / pair.spacing if answer.found else None}
 

@@ -1,7 +1,7 @@
 """Pairs of clouds whose pose is known: views, parts, crops and clutter; each is made again from its row, noise and number.
 
 A pair is right by less than 5 degrees and 5 spacings at the middle of the part, up to the symmetries of the part. The
-groups are exact: turns about an axis by a share of the circle or by any angle, and half turns about axes across it.
+groups are exact: turns about an axis by a share of the circle, and half turns about axes across it.
 """
 
 from __future__ import annotations
@@ -38,21 +38,17 @@ class Pair:
         True T_target_source.
     group : (G, 4, 4) float64
         Moves of the source's frame that leave its part as it is.
-    axis : (2, 3) float64 or None
-        A point on and the direction of an axis about which any turn leaves the part as it is.
     middle : (3,) float64
         Of the part, in the source's frame.
     spacing : float
         Of the coarser cloud.
     """
 
-    name: str
     part: str
     source: Cloud
     target: Cloud
     pose: np.ndarray
     group: np.ndarray
-    axis: np.ndarray | None
     middle: np.ndarray
     spacing: float
 
@@ -61,26 +57,16 @@ def errors(pair: Pair, found: np.ndarray) -> tuple[float, float]:
     """Degrees and spacings by which a pose is off, up to the part's symmetry; the smallest by their larger share."""
     best = (np.inf, np.inf)
     for move in pair.group:
-        for turned in _turned(pair, found, pair.pose @ move):
-            rotation = found[:3, :3].T @ turned[:3, :3]
-            degrees = float(np.degrees(np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1, 1))))
-            off = (found - turned) @ np.append(pair.middle, 1)
-            best = min(best, (degrees, float(np.linalg.norm(off[:3])) / pair.spacing), key=max)
+        true = pair.pose @ move
+        rotation = found[:3, :3].T @ true[:3, :3]
+        degrees = float(np.degrees(np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1, 1))))
+        off = (found - true) @ np.append(pair.middle, 1)
+        best = min(best, (degrees, float(np.linalg.norm(off[:3])) / pair.spacing), key=max)
     return best
 
 
-def _turned(pair: Pair, found: np.ndarray, true: np.ndarray) -> list[np.ndarray]:
-    """Return the true pose, turned about the axis of any turn so that it comes nearest to what was found."""
-    if pair.axis is None:
-        return [true]
-    point, axis = pair.axis
-    relative = true[:3, :3].T @ found[:3, :3]
-    angle = np.arctan2((np.cross(np.eye(3), axis) * -relative.T).sum(), np.trace(relative) - axis @ relative @ axis)
-    return [true @ turn_about(axis, a, point) for a in (angle, -angle)]
-
-
 def turn_about(axis: Any, angle: float, point: Any = (0, 0, 0)) -> np.ndarray:
-    """Turn about an axis through a point (4, 4)."""
+    """Turn about an axis through a point (4, 4), against the right hand."""
     axis, point = np.asarray(axis, float) / np.linalg.norm(axis), np.asarray(point, float)
     across = np.cross(np.eye(3), -axis)
     pose = np.eye(4)
@@ -90,30 +76,29 @@ def turn_about(axis: Any, angle: float, point: Any = (0, 0, 0)) -> np.ndarray:
 
 
 _TOOTH = 2 * np.pi / 16 * 0.725  # where the middle of a tooth is
-SYMMETRIES: dict[str, tuple[list[tuple[Any, int]], Any]] = {
-    "cube_fractal": ([((0, 0, 1), 4), ((1, 0, 0), 4)], None),
-    "frustum": ([((0, 0, 1), 6)], None),
-    "flange": ([((0, 0, 1), 8)], None),
-    "tee": ([((0, 1, 0), 2)], None),
-    "elbow": ([((1, 1, 0), 2)], None),
-    "gear": ([((0, 0, 1), 16), ((np.cos(_TOOTH), np.sin(_TOOTH), 0), 2)], None),
+SYMMETRIES: dict[str, list[tuple[Any, int]]] = {
+    "cube_fractal": [((0, 0, 1), 4), ((1, 0, 0), 4)],
+    "frustum": [((0, 0, 1), 6)],
+    "flange": [((0, 0, 1), 8)],
+    "tee": [((0, 1, 0), 2)],
+    "elbow": [((1, 1, 0), 2)],
+    "gear": [((0, 0, 1), 16), ((np.cos(_TOOTH), np.sin(_TOOTH), 0), 2)],
 }
 """Generators of each part's proper symmetries (axis through its middle, or through the origin where told; order)."""
 
 
-def symmetry(name: str, solid: Solid) -> tuple[np.ndarray, np.ndarray | None]:
-    """Return the part's group (G, 4, 4), and its axis of any turn (2, 3)."""
-    generators, axis = SYMMETRIES.get(name, ([], None))
+def symmetry(name: str, solid: Solid) -> np.ndarray:
+    """Return the part's group (G, 4, 4)."""
     middle = (solid.vertices.min(axis=0) + solid.vertices.max(axis=0)) / 2
     point = np.zeros(3) if name == "elbow" else middle
     moves = [np.eye(4)]
-    steps = [turn_about(a, 2 * np.pi / n, point) for a, n in generators]
+    steps = [turn_about(a, 2 * np.pi / n, point) for a, n in SYMMETRIES.get(name, [])]
     for move in moves:  # it grows while it is read, until the group is closed
         for step in steps:
             new = step @ move
             if all(np.abs(new - old).max() > 1e-6 for old in moves):
                 moves.append(new)
-    return np.array(moves), axis
+    return np.array(moves)
 
 
 @cache
@@ -153,7 +138,7 @@ def make(row: str, noise: float, number: int, *, held: int = 0) -> Pair:
     names = {"planar": PLANAR, "round": ROUND}.get(row, PLANAR + ROUND)
     name = names[number % len(names)]
     solid = solid_of(name)
-    group, axis = symmetry(name, solid)
+    group = symmetry(name, solid)
     h = spacing_of(solid)
     maker = {"part to view": _part_to_view, "clutter": _clutter, "crops": _crops}.get(row, _view_to_view)
     while True:
@@ -162,9 +147,7 @@ def make(row: str, noise: float, number: int, *, held: int = 0) -> Pair:
             break
     inverse = np.linalg.inv(frame)
     middle = (frame @ np.append((solid.vertices.min(axis=0) + solid.vertices.max(axis=0)) / 2, 1))[:3]
-    return Pair(
-        f"{row}/{name}/n{noise:g}/{number}", name, source, target, pose, frame @ group @ inverse, axis, middle, h
-    )
+    return Pair(name, source, target, pose, frame @ group @ inverse, middle, h)
 
 
 def _view(

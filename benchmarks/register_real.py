@@ -1,4 +1,4 @@
-"""Registration on real frames: two halves of one, the second moved by a pose that is known, and two sensors of one scene.
+"""Registration on real frames: two halves of one, the second moved by a pose that is known.
 
 Run: python benchmarks/register_real.py [--data ../shared/data]. Halves overlap by a quarter of the frame. What their errors
 do not show: the halves share sensor and moment, so they are easier than two frames.

@@ -9,7 +9,7 @@ from edgel.matching._open import covariance_of, free_directions_of
 from edgel.matching._prepare import Prepared
 from edgel.matching._refine import middle_of, radius_of
 from edgel.matching._registration import Poses, Registration, not_found
-from edgel.matching._search import Found, Match, has_more_edges, search
+from edgel.matching._search import END, Found, Match, has_more_edges, search
 from edgel.matching._symmetry import same_answers
 from edgel.matching._verify import EDGE, SURFACE, VISIBLE
 
@@ -21,7 +21,6 @@ _ORDERS = 15.0  # spacings of either cloud that the other has to be large
 _FEWEST_PLACES = 30
 _FEW_EDGES = 24  # half-edges of a search, with fewer of which the surface proposes poses
 _PLANE = 0.95  # cosine of normals that look the same way, and their share
-_END = 1.5  # spacings
 
 
 def register_prepared(
@@ -40,7 +39,7 @@ def register_prepared(
         # The cloud with fewer edges is looked for in the other: more of them have a match.
         swapped = initial is None and has_more_edges(source, target)
         match = Match.of(target, source) if swapped else Match.of(source, target)
-        end = _END * match.spacing if end is None else end
+        end = END * match.spacing if end is None else end
         if initial is None:
             found, method = _searched(match, end)
         else:
@@ -77,8 +76,6 @@ def _answer(
 ) -> Registration:
     """Say what was found, in the frames of the source and the target that were asked for."""
     (pose, *_), score = found.poses, float(found.scores[0])
-    _, information, residuals = match.refined(pose[None], end)
-    free = free_directions_of(match, pose, information[0].sum(axis=0), residuals[0, 0])
     same, group = same_answers(match, found, swapped, symmetries)
     others = found.scores[~same]
     margin = 1.0 if not len(others) else float(np.clip((score - others[0]) / max(score, 1e-9), 0, 1))
@@ -87,6 +84,8 @@ def _answer(
     doubt = _doubt(found, margin)
     if doubt:
         return not_found(doubt, stages.seconds, Poses(turned, found.scores))
+    _, information, residuals = match.refined(pose[None], end)
+    free = free_directions_of(match, pose, information[0].sum(axis=0), residuals[0, 0])
     scale = np.append(np.full(3, 1 / radius_of(match.whole)), np.ones(3))
     covariance = covariance_of(match, information[0], residuals[0], free) * np.outer(scale, scale)
     center = pose[:3, :3] @ middle_of(match.whole) + pose[:3, 3]

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from edgel.io import FormatError
-from edgel.io.mesh import load
+from edgel.io.mesh import EXTENSIONS, load
 from edgel.matching._mesh import triangles_of
 from edgel.matching._step import read_step
 
-MESHES, STEPS = (".stl", ".ply", ".obj", ".off"), (".step", ".stp")
-FILES = (*MESHES, *STEPS)
+STEPS = (".step", ".stp")
+FILES = (*EXTENSIONS, *STEPS)
 
 
 def read_part(path: str | os.PathLike[str]) -> tuple[np.ndarray, np.ndarray]:
@@ -27,7 +27,7 @@ def read_part(path: str | os.PathLike[str]) -> tuple[np.ndarray, np.ndarray]:
     name, kind = os.fspath(path), Path(path).suffix.lower()
     if kind in STEPS:
         return read_step(name)
-    if kind not in MESHES:
-        raise FormatError(f"{name}: a part is a mesh ({', '.join(MESHES)}) or STEP ({', '.join(STEPS)})")
+    if kind not in EXTENSIONS:
+        raise FormatError(f"{name}: a part is a mesh ({', '.join(EXTENSIONS)}) or STEP ({', '.join(STEPS)})")
     mesh = load(path)
     return triangles_of(mesh.vertices, mesh.faces)

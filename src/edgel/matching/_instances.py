@@ -9,13 +9,12 @@ import numpy as np
 from edgel._kernels.parallel import kernel, run_slices
 from edgel._stages import Stages
 from edgel.matching._answer import register_prepared
-from edgel.matching._grid import find_cell
+from edgel.matching._grid import build_grid, find_cell
 from edgel.matching._prepare import Prepared
 from edgel.matching._registration import Registration
-from edgel.matching._search import Match
+from edgel.matching._search import REACH
 
 _CLAIM = 3.0  # spacings from the part within which the scene is its
-_FEWEST = 30  # places of a surface, without which no more is looked for
 
 
 def find_instances(
@@ -23,26 +22,25 @@ def find_instances(
 ) -> list[Registration]:
     """Find up to so many instances of a model in a scene."""
     found: list[Registration] = []
-    while len(found) < most and len(scene.surface) >= _FEWEST:
+    while len(found) < most:
         one = register_prepared(model, scene, stages, None, end, symmetries)
         if not one.found:
             break
         found.append(one)
-        scene = _without(scene, model, one.T_target_source)
+        if len(found) < most:
+            scene = _without(scene, model, one.T_target_source)
     return found
 
 
 def _without(scene: Prepared, model: Prepared, pose: np.ndarray) -> Prepared:
     """Take the edges and the surface that a model explains out of a scene."""
-    field = Match.of(scene, model).fine
+    grid = build_grid(model.surface, max(REACH * scene.spacing, 1.5 * model.gap))
     back = np.linalg.inv(pose)
     near = []
     for places in (scene.half.places, scene.surface):
         claimed = np.zeros(len(places), np.bool_)
         moved = places @ back[:3, :3].T + back[:3, 3]
-        run_slices(
-            _claim, len(moved), moved, field.surface, field.surface_grid, _CLAIM * scene.spacing, field.normals, claimed
-        )
+        run_slices(_claim, len(moved), moved, model.surface, grid, _CLAIM * scene.spacing, model.normals, claimed)
         near.append(~claimed)
     half, surface = near
     return replace(

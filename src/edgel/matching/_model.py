@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from edgel._neighbors.thinning import thin_to
+from edgel._objects import NORMALS
 from edgel._stages import Stages
 from edgel.cloud import Cloud
 from edgel.edges import Edges
@@ -86,7 +87,7 @@ class Model:
         places, normals = places[rows], normals[rows]
         smooth = away_from(places, half.places, _SMOOTH * size) >= _SMOOTH * size
         gap = float(np.sqrt(area / len(places)))
-        return Prepared(half, places, normals, smooth, gap, 0.0, size, no_sight(), False)
+        return Prepared(half, places, normals, smooth, gap, 0.0, size, no_sight())
 
     @cached_property
     def symmetries(self) -> np.ndarray:
@@ -95,7 +96,7 @@ class Model:
 
     def to_cloud(self) -> Cloud:
         """Return places evenly over the surface as a cloud with its normals (nx, ny, nz)."""
-        columns = {f"n{axis}": self.prepared.normals[:, i].astype(np.float32) for i, axis in enumerate("xyz")}
+        columns = {name: self.prepared.normals[:, i].astype(np.float32) for i, name in enumerate(NORMALS)}
         return Cloud(self.prepared.surface, columns)
 
     def creases(self, lift: float = 0.0) -> np.ndarray:

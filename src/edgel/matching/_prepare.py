@@ -47,8 +47,6 @@ class Prepared:
     size : float
         Diagonal of what holds 96 % of the points along each axis.
     sight : Sight
-    has_sight : bool
-        Whether the sensor's place is known.
     """
 
     half: HalfEdges
@@ -59,7 +57,11 @@ class Prepared:
     spacing: float
     size: float
     sight: Sight
-    has_sight: bool
+
+    @property
+    def has_sight(self) -> bool:
+        """Whether the sensor's place is known."""
+        return len(self.sight.near) > 1
 
 
 def prepare(points: Any, edges: Edges | None, name: str) -> Prepared:
@@ -97,7 +99,7 @@ def prepare(points: Any, edges: Edges | None, name: str) -> Prepared:
     sight = no_sight() if cloud.viewpoint is None else build_sight(xyz, cloud.viewpoint)
     smooth = away[clear] >= _SMOOTH * spacing
     gap = spacing * float(np.sqrt(len(xyz) / len(thinned)))
-    return Prepared(half, places[clear], normals[clear], smooth, gap, spacing, size, sight, cloud.viewpoint is not None)
+    return Prepared(half, places[clear], normals[clear], smooth, gap, spacing, size, sight)
 
 
 def shared_planes(side: Prepared) -> float:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from edgel._kernels.cholesky import explain, factorize, solve
-from edgel._kernels.parallel import kernel, run_slices
+from edgel._kernels.parallel import kernel, routine, run_slices
 from edgel.matching._verify import Field, Probes, find_edge, find_surface, move, turned_by
 
 _SHRINK = 0.75  # of the reach, from step to step
@@ -17,7 +17,7 @@ _DAMPING = 1e-4  # of the mean weight, so that what nothing settles stays as it 
 _SETTLED = 1e-5  # of the reach: a step that moves less is the last
 
 
-@kernel
+@routine
 def _add(matrix, right, normal, offset, away, radius, weight):
     """Add one distance along a normal (3,) at an offset (3,) from the centre; rotations count as arcs at the radius."""
     row = np.empty(6)
@@ -31,7 +31,7 @@ def _add(matrix, right, normal, offset, away, radius, weight):
             matrix[i, j] += weight * row[i] * row[j]
 
 
-@kernel
+@routine
 def _equations(pose, probes, field, centre, radius, reach, light, information, sums, matrix, right):
     """Write the normal equations of one step, and what planes and edges tell and weigh, each by themselves."""
     planes, edges = information[0], information[1]
@@ -72,7 +72,7 @@ def _equations(pose, probes, field, centre, radius, reach, light, information, s
         matrix[i, i] += _DAMPING * (sums[0] + share * sums[2])
 
 
-@kernel
+@routine
 def _turn(pose, turn, shift, centre):
     """Turn a pose about a centre by a rotation vector (3,), and shift it, in place."""
     angle = math.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -19,7 +20,8 @@ _SOURCES, _TARGETS, _VOTERS, _SURFACE = 300, 2400, 64, 250
 _PAIRS = 250_000  # that are tried, by fewer of the source where the target has many
 _MOST = 2000  # half-edges, and places of the surface, that refine
 _PROPOSED, _REFINED, _FINAL = 1500, 80, 12
-_REACH, _TIGHT, _END = 4.0, 2.0, 1.5  # spacings: matches at first, of a verification, and in the end
+REACH, _TIGHT, END = 4.0, 2.0, 1.5
+"""Spacings within which matches lie: at first, of a verification, and in the end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +79,7 @@ class Match:
     @property
     def same(self) -> float:
         """Poses that move the surface by less come to the same."""
-        return _REACH * self.spacing
+        return REACH * self.spacing
 
     @staticmethod
     def of(source: Prepared, target: Prepared, least: float = 0.0) -> Match:
@@ -86,24 +88,34 @@ class Match:
         apart = _apart(source, target, spacing)
         few = _probes(source.half.thinned(apart, _SOURCES), source, _SURFACE)
         whole = _probes(source.half.thinned(spacing / 2, _MOST), source, _MOST)
-        return Match(source, target, spacing, apart, few, whole, _field(target, target.half, _REACH * spacing))
+        return Match(source, target, spacing, apart, few, whole, _field(target, target.half, REACH * spacing))
 
+    @cached_property
+    def apart_in_target(self) -> HalfEdges:
+        """Half-edges of the target that lie apart."""
+        return self.target.half.thinned(self.apart, _TARGETS)
+
+    @cached_property
     def coarse(self) -> Field:
-        """Return a field of the target in which half-edges lie apart."""
-        return _field(self.target, self.target.half.thinned(self.apart, _TARGETS), 1.5 * self.apart)
+        """A field of the target in which half-edges lie apart."""
+        return _field(self.target, self.apart_in_target, 1.5 * self.apart)
+
+    @cached_property
+    def back(self) -> tuple[Probes, Field]:
+        """What verifies the other way round: the target's probes, and a field of the source."""
+        theirs = _probes(self.apart_in_target, self.target, 2 * _SURFACE)
+        return theirs, _field(self.source, self.source.half, REACH * self.spacing)
 
     def refined(self, poses: np.ndarray, end: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Refine poses (see `refine`), until matches lie within a distance."""
-        return refine(poses, self.whole, self.fine, (max(_REACH * self.spacing, end), end), (12, 10))
+        return refine(poses, self.whole, self.fine, (max(REACH * self.spacing, end), end), (12, 10))
 
     def verified(self, poses: np.ndarray) -> Found:
         """Verify poses by both clouds, best first, without those that come to the same."""
         if not len(poses):
             return Found(poses, np.empty(0), np.empty((0, 2, 5)))
         there = confirm(poses, self.few, self.fine, self.tight)
-        mine = _field(self.source, self.source.half, _REACH * self.spacing)
-        theirs = _probes(self.target.half.thinned(self.apart, _TARGETS), self.target, 2 * _SURFACE)
-        back = confirm(np.linalg.inv(poses), theirs, mine, self.tight)
+        back = confirm(np.linalg.inv(poses), *self.back, self.tight)
         scores = scores_of(there) - back[:, THROUGH] - 0.5 * back[:, MISSING]
         found = Found(poses, scores, np.stack([there, back], axis=1)).take(np.argsort(-scores, kind="stable"))
         return found.take(distinct_rows(found.poses, self.whole, self.same))
@@ -124,7 +136,7 @@ def search(match: Match, end: float, most: int = _FINAL, *, by_surface: bool = F
 
     Pairs of half-edges propose them, or pairs of places on the surface.
     """
-    coarse, few, spacing = match.coarse(), match.few, match.spacing
+    coarse, few, spacing = match.coarse, match.few, match.spacing
     if by_surface:
         poses = propose_by_surface(match.source, match.target)
         votes = scores_of(confirm(poses, _probes(HalfEdges.none(), match.source, _VOTERS), coarse, match.apart))
@@ -132,13 +144,13 @@ def search(match: Match, end: float, most: int = _FINAL, *, by_surface: bool = F
     else:
         chosen = _some(few, max(_PAIRS // max(len(coarse.turn), 1), _VOTERS))
         poses = propose(chosen, _some(few, _VOTERS), coarse, match.apart, _PROPOSED)
-    surface, normals, shares = (column[::2] for column in few[5:])
+    surface, normals, shares = (np.ascontiguousarray(column[::2]) for column in few[5:])
     rough = _some(few, 2 * _VOTERS)._replace(surface=surface, normals=normals, surface_weights=shares)
     scores = scores_of(confirm(poses, rough, coarse, match.apart))
     poses = _best(poses, scores, few, 2 * match.apart, max(_REFINED, 2 * most))
-    poses, _, _ = refine(poses, few, coarse, (1.5 * match.apart, _REACH * spacing), (5, 0))
-    poses, _, _ = refine(poses, few, match.fine, (_REACH * spacing, _TIGHT * spacing), (6, 0))
-    scores = scores_of(confirm(poses, few, match.fine, _TIGHT * spacing))
+    poses, _, _ = refine(poses, few, coarse, (1.5 * match.apart, REACH * spacing), (5, 0))
+    poses, _, _ = refine(poses, few, match.fine, (REACH * spacing, match.tight), (6, 0))
+    scores = scores_of(confirm(poses, few, match.fine, match.tight))
     poses = _best(poses, scores, few, 2 * spacing, most)
     return match.verified(match.refined(poses, end)[0])
 
@@ -146,8 +158,9 @@ def search(match: Match, end: float, most: int = _FINAL, *, by_surface: bool = F
 def _probes(half: HalfEdges, side: Prepared, most: int) -> Probes:
     """Make probes of half-edges and about so many places of a surface, each weighed by how rare its direction is."""
     rows = np.unique(np.linspace(0, len(side.surface) - 1, min(most, len(side.surface))).astype(np.int64))
-    shares = rareness(side.normals[rows][:, None]) if len(rows) <= 2 * _SURFACE else np.ones(len(rows))
-    weights = rareness(half.frames[:, :2]) if len(half) <= _TARGETS else np.ones(len(half))
+    if most > 2 * _SURFACE:  # for refinement, which asks for no weights
+        return probes_of(half, np.ones(len(half)), side.surface[rows], side.normals[rows], np.ones(len(rows)))
+    shares, weights = rareness(side.normals[rows][:, None]), rareness(half.frames[:, :2])
     return probes_of(half, weights, side.surface[rows], side.normals[rows], shares)
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from edgel._kernels.parallel import kernel
+from edgel._kernels.parallel import kernel, routine
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import knn
 
@@ -52,7 +52,7 @@ def build_sight(xyz: np.ndarray, eye: np.ndarray) -> Sight:
     return Sight(near, far, np.asarray(eye, np.float64))
 
 
-@kernel
+@routine
 def _pixel(side, x, y, z):
     """Row and column of a direction, of any length, on the octahedron's net."""
     total = abs(x) + abs(y) + abs(z)

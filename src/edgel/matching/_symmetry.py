@@ -6,7 +6,7 @@ import numpy as np
 
 from edgel.matching._open import rotation_of, vector_of
 from edgel.matching._prepare import Prepared
-from edgel.matching._search import Found, Match, distances, distinct_rows, search
+from edgel.matching._search import END, Found, Match, distances, distinct_rows, search
 from edgel.matching._verify import EDGE, MISSING, SURFACE, confirm
 
 TURNS = 72
@@ -24,14 +24,16 @@ _RIVAL = 0.5  # of the best score, from where on it is asked whether an alternat
 def symmetries_of(part: Prepared) -> np.ndarray:
     """Find the moves (S, 4, 4) that leave a part as it is, the identity first; any turn about an axis as `TURNS`."""
     match = Match.of(part, part, part.size / _FINE)
-    found = search(match, 1.5 * match.spacing, most=_MOST)
+    found = search(match, END * match.spacing, most=_MOST)
     moves = np.eye(4)[None]
     new = found.poses[_leave(match, found.poses)]
     while len(new) and len(moves) < _ROUND:  # what two of them do one after the other is a symmetry, too
         count = len(moves)
         moves = np.concatenate([moves, new])
         moves = moves[distinct_rows(moves, match.whole, match.same)]
-        new = np.einsum("aij,bjk->abik", moves, moves).reshape(-1, 4, 4)[: _TRIED if len(moves) > count else 0]
+        if len(moves) == count:
+            break
+        new = np.einsum("aij,bjk->abik", moves, moves).reshape(-1, 4, 4)[:_TRIED]
         new = new[_leave(match, new)]
     if len(moves) >= _ROUND:
         moves = np.concatenate([moves[:1], _turns(moves[1:], part.surface.mean(axis=0))])
