@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 HELP = """Repeat the published experiment: simulate a scanned tee and elbow, find their edges, time their normals.
 
 The paper's Tables 1 and 2 are printed beside what this machine finds. Into the folder go a report with figures, to look
-at in a browser, and the clouds and their edge points as PLY. It takes half a minute, and needs Matplotlib
-(pip install 'edgel[plot]').
+at in a browser, and the clouds and their edge points as PLY. It takes half a minute, the first time twice as
+long, and needs Matplotlib (pip install 'edgel\\[plot]').
 
 \b
 Examples:
