@@ -13,15 +13,15 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from multiprocessing.pool import Pool
 from pathlib import Path
 
 import lightgbm
 import numpy as np
-from training_examples import example
+from training_examples import example, is_landscape
 
 import edgel._surface
 from edgel import metrics
@@ -196,32 +196,46 @@ def blur(rows: np.ndarray, columns: slice, spread: np.ndarray, seed: int) -> Non
 
 def train_first(pool: Pool, scenes: int) -> tuple[dict[str, Forest], list[dict[str, Forest]]]:
     """Train the first forests on all scenes; and for each half of them, by kind, on the scenes of the other half."""
-    tables = list(map(own_evidence, range(scenes)))
-    np.save(CACHE / "half.npy", np.concatenate([np.full(len(t.weights), seed % 2) for seed, t in enumerate(tables)]))
-    table = Table.join(tables)
-    table.save()
+    table = keep(map(own_evidence, range(scenes)))
     creases, outlines = table.labels.sum(axis=0)
     print(f"\n{len(table.weights):,} points, {creases:,} on creases, {outlines:,} on outlines", flush=True)
-    jobs = [(kind, FIRST[kind], half) for half in (None, 0, 1) for kind in KINDS]
-    forests = {(half, kind): f for (kind, _, half), f in zip(jobs, pool.imap(train, jobs), strict=True)}
-    first = {f"first {kind}": forests[None, kind] for kind in KINDS}
-    return first, [{kind: forests[half, kind] for kind in KINDS} for half in (0, 1)]
+    wanted = [(kind, half) for half in (None, 0, 1) for kind in KINDS]
+    jobs = [(kind, FIRST[kind], half, outdoors) for kind, half in wanted for outdoors in (False, True)]
+    both = dict(zip(wanted, pairs_of(pool.imap(train, jobs)), strict=True))
+    first = {f"first {kind}": mean(both[kind, None]) for kind in KINDS}
+    return first, [{kind: mean(both[kind, half]) for kind in KINDS} for half in (0, 1)]
 
 
 def train_second(pool: Pool, scenes: int, halves: list[dict[str, Forest]]) -> dict[str, Forest]:
     """Train the second forests, by what those of the halves say of the neighbours."""
     jobs = [(seed, halves[seed % 2]) for seed in range(scenes)]
-    Table.join(pool.imap(evidence_in_context, jobs, chunksize=4)).save()
+    keep(pool.imap(evidence_in_context, jobs, chunksize=4))
     print("the first trees are trained", flush=True)
-    jobs = [(kind, SECOND[kind], None) for kind in KINDS]
-    return dict(zip(KINDS, pool.map(train, jobs, chunksize=1), strict=True))
+    jobs = [(kind, SECOND[kind], None, outdoors) for kind in KINDS for outdoors in (False, True)]
+    return dict(zip(KINDS, map(mean, pairs_of(pool.imap(train, jobs))), strict=True))
+
+
+def keep(tables: Iterable[Table]) -> Table:
+    """Keep the rows to learn from, a table for each seed, and what scenes they are of."""
+    tables = list(tables)
+    seeds = np.repeat(np.arange(len(tables)), [len(table.weights) for table in tables])
+    np.save(CACHE / "half.npy", seeds % 2)
+    np.save(CACHE / "landscape.npy", np.array([is_landscape(seed) for seed in range(len(tables))])[seeds])
+    joined = Table.join(tables)
+    joined.save()
+    return joined
 
 
 def learned(stored: Mapping[str, np.ndarray], seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Which points with evidence are learned from, and how much each counts: all on edges, a share of the others."""
+    """Which points with evidence are learned from, and how much each counts: all on edges, a share of the others.
+
+    Of landscapes what is near an edge is left out: where boxes overlap, truth and what beams could see differ.
+    """
     edge = stored["labels"].any(axis=1)
     share = np.where(edge, 1.0, np.where(stored["near"], SHARE_NEAR, SHARE_FAR))
     kept = stored["counts"] & (np.random.default_rng([seed, 1]).random(len(edge)) < share)
+    if is_landscape(seed):
+        kept &= ~edge & ~stored["near"]
     return kept, (1 / (share * stored["share"])).astype(np.float32)
 
 
@@ -249,11 +263,14 @@ def evidence_in_context(job: tuple[int, dict[str, Forest]]) -> Table:
     return Table(rows, stored["labels"][kept & likely], weights[kept & likely])
 
 
-def train(job: tuple[str, Size, int | None]) -> Forest:
-    """Train a forest of one kind on the table kept last, of all scenes or of those that are not of one half."""
-    kind, size, half = job
+def train(job: tuple[str, Size, int | None, bool]) -> Forest:
+    """Train a forest of one kind on the table kept last: on all scenes or one half's complement, outdoors or not."""
+    kind, size, half, outdoors = job
     table = Table.load()
-    rows = slice(None) if half is None else np.flatnonzero(np.load(CACHE / "half.npy") != half)
+    kept = np.load(CACHE / "half.npy") != half if half is not None else np.ones(len(table.weights), bool)
+    if not outdoors:
+        kept &= ~np.load(CACHE / "landscape.npy")
+    rows = np.flatnonzero(kept)
     return grow(table.features[rows], table.labels[rows, KINDS.index(kind)], table.weights[rows], size)
 
 
@@ -261,6 +278,19 @@ def grow(rows: np.ndarray, wanted: np.ndarray, weights: np.ndarray, size: Size) 
     data = lightgbm.Dataset(rows, wanted, weight=weights)
     options = OPTIONS | {"num_leaves": size.leaves, "learning_rate": size.rate}
     return flatten(lightgbm.train(options, data, size.trees))
+
+
+def pairs_of(forests: Iterator[Forest]) -> Iterator[tuple[Forest, Forest]]:
+    """Take two at a time."""
+    return zip(forests, forests, strict=True)
+
+
+def mean(pair: Sequence[Forest]) -> Forest:
+    """Put two forests together whose logits are halved, so that the sum is their mean."""
+    one, other = pair
+    moved = replace(other, roots=other.roots + len(one.feature), right=other.right + len(one.feature))
+    both = Forest(*(np.concatenate([getattr(f, name) for f in (one, moved)]) for name in Forest.__dataclass_fields__))
+    return replace(both, threshold=np.where(both.feature < 0, both.threshold / 2, both.threshold))
 
 
 def flatten(model: lightgbm.Booster) -> Forest:
