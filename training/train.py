@@ -13,8 +13,9 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import starmap
 from multiprocessing import get_context
 from multiprocessing.pool import Pool
 from pathlib import Path
@@ -30,7 +31,7 @@ from edgel._surface.classify import SECOND as LIKELY
 from edgel._surface.evidence import Evidence
 from edgel._surface.forest import Forest, evaluate, read_forests, write_forests
 from edgel._surface.screen import POINT as SCREENED
-from edgel._surface.training import add_context, screen_cloud, screening_features
+from edgel._surface.training import add_context, mean, screen_cloud, screening_features
 
 CACHE = Path(__file__).parent / "cache"
 OUT = Path(edgel._surface.__file__).parent / "weights.npz"
@@ -202,8 +203,8 @@ def train_first(pool: Pool, scenes: int) -> tuple[dict[str, Forest], list[dict[s
     wanted = [(kind, half) for half in (None, 0, 1) for kind in KINDS]
     jobs = [(kind, FIRST[kind], half, outdoors) for kind, half in wanted for outdoors in (False, True)]
     both = dict(zip(wanted, pairs_of(pool.imap(train, jobs)), strict=True))
-    first = {f"first {kind}": mean(both[kind, None]) for kind in KINDS}
-    return first, [{kind: mean(both[kind, half]) for kind in KINDS} for half in (0, 1)]
+    first = {f"first {kind}": mean(*both[kind, None]) for kind in KINDS}
+    return first, [{kind: mean(*both[kind, half]) for kind in KINDS} for half in (0, 1)]
 
 
 def train_second(pool: Pool, scenes: int, halves: list[dict[str, Forest]]) -> dict[str, Forest]:
@@ -212,15 +213,15 @@ def train_second(pool: Pool, scenes: int, halves: list[dict[str, Forest]]) -> di
     keep(pool.imap(evidence_in_context, jobs, chunksize=4))
     print("the first trees are trained", flush=True)
     jobs = [(kind, SECOND[kind], None, outdoors) for kind in KINDS for outdoors in (False, True)]
-    return dict(zip(KINDS, map(mean, pairs_of(pool.imap(train, jobs))), strict=True))
+    return dict(zip(KINDS, starmap(mean, pairs_of(pool.imap(train, jobs))), strict=True))
 
 
 def keep(tables: Iterable[Table]) -> Table:
     """Keep the rows to learn from, a table for each seed, and what scenes they are of."""
     tables = list(tables)
-    seeds = np.repeat(np.arange(len(tables)), [len(table.weights) for table in tables])
-    np.save(CACHE / "half.npy", seeds % 2)
-    np.save(CACHE / "landscape.npy", np.array([is_landscape(seed) for seed in range(len(tables))])[seeds])
+    rows = [len(table.weights) for table in tables]
+    np.save(CACHE / "half.npy", np.repeat(np.arange(len(tables)) % 2, rows))
+    np.save(CACHE / "landscape.npy", np.repeat([is_landscape(seed) for seed in range(len(tables))], rows))
     joined = Table.join(tables)
     joined.save()
     return joined
@@ -267,10 +268,10 @@ def train(job: tuple[str, Size, int | None, bool]) -> Forest:
     """Train a forest of one kind on the table kept last: on all scenes or one half's complement, outdoors or not."""
     kind, size, half, outdoors = job
     table = Table.load()
-    kept = np.load(CACHE / "half.npy") != half if half is not None else np.ones(len(table.weights), bool)
+    left_out = np.load(CACHE / "half.npy") == (-1 if half is None else half)
     if not outdoors:
-        kept &= ~np.load(CACHE / "landscape.npy")
-    rows = np.flatnonzero(kept)
+        left_out |= np.load(CACHE / "landscape.npy")
+    rows = np.flatnonzero(~left_out)
     return grow(table.features[rows], table.labels[rows, KINDS.index(kind)], table.weights[rows], size)
 
 
@@ -283,14 +284,6 @@ def grow(rows: np.ndarray, wanted: np.ndarray, weights: np.ndarray, size: Size) 
 def pairs_of(forests: Iterator[Forest]) -> Iterator[tuple[Forest, Forest]]:
     """Take two at a time."""
     return zip(forests, forests, strict=True)
-
-
-def mean(pair: Sequence[Forest]) -> Forest:
-    """Put two forests together whose logits are halved, so that the sum is their mean."""
-    one, other = pair
-    moved = replace(other, roots=other.roots + len(one.feature), right=other.right + len(one.feature))
-    both = Forest(*(np.concatenate([getattr(f, name) for f in (one, moved)]) for name in Forest.__dataclass_fields__))
-    return replace(both, threshold=np.where(both.feature < 0, both.threshold / 2, both.threshold))
 
 
 def flatten(model: lightgbm.Booster) -> Forest:

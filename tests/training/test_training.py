@@ -2,15 +2,18 @@
 
 import numpy as np
 import pytest
-from training_examples import example
+from random_scenes import by_cells, labels
+from training_examples import example, is_landscape
 
+from edgel import synth
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.scan_lines import scan_line_stretch
 from edgel._surface import classify, cloud_statistics, screen
+from edgel._surface.coarser import CELL
 from edgel._surface.features import LEAF, NUM_EVIDENCE, NUM_SCREEN, POINT
 from edgel._surface.forest import evaluate, load_forests
 from edgel._surface.smoothing import smoothed
-from edgel._surface.training import add_context, screen_cloud, screening_features
+from edgel._surface.training import add_context, mean, screen_cloud, screening_features
 
 
 @pytest.fixture(scope="module", params=[0, 1, 13])  # a whole surface, a view, a relief
@@ -32,6 +35,35 @@ def test_the_seed_decides():
     assert one.xyz.tobytes() == same.xyz.tobytes()
     assert one.labels.tobytes() == same.labels.tobytes()
     assert not np.array_equal(one.xyz, other.xyz)
+
+
+def test_the_mean_of_two_forests_is_that_of_their_logits():
+    forests = load_forests()
+    rows = np.random.default_rng(0).random((500, len(POINT)), np.float32)
+    one, other = forests["crease"], forests["outline"]
+    p, q, both = (evaluate(forest, rows) for forest in (one, other, mean(one, other)))
+    open_ = (np.minimum(p, q) > 1e-9) & (np.maximum(p, q) < 1 - 1e-9)
+    assert open_.mean() > 0.5
+    logit = [np.log(each[open_] / (1 - each[open_])) for each in (p, q, both)]
+    np.testing.assert_allclose(logit[2], (logit[0] + logit[1]) / 2, atol=1e-5)
+
+
+def test_an_eighth_of_the_examples_are_landscapes():
+    landscapes = [seed for seed in range(400) if is_landscape(seed)]
+    assert 35 <= len(landscapes) <= 65
+    made = example(landscapes[0])
+    assert made.spacing == 1.0
+    assert np.ptp(made.xyz[:, :2]) > np.ptp(made.xyz[:, 2])
+
+
+def test_noisy_surfaces_are_seen_by_cells_too():
+    scene = synth.sample(synth.stepped_block(), spacing=4.0, noise=1.0, seed=3)
+    made = by_cells(scene)
+    assert made.spacing == pytest.approx(CELL * scene.spacing)
+    assert 1.5 < len(scene.cloud.xyz) / len(made.cloud.xyz) < 4
+    true, counts = labels(made)
+    assert 0.02 < true.any(axis=1).mean() < 0.6
+    assert counts.all()
 
 
 def test_screening_features_are_in_the_layouts(made):
