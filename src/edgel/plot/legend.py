@@ -100,7 +100,7 @@ class Legend:
         for placed in self._placed:
             self._draw_entry(draw, placed.entry, placed.left, top + (placed.line + 0.5) * self._line, ink)
         length = round_length(_BAR * self._width * pixel)
-        away = "" if np.isnan(distance) else f" at distance {distance:.2g}"
+        away = "" if np.isnan(distance) else f" at distance {float(f'{distance:.2g}'):g}"
         label = f"{length:g} unit{'s' * (length != 1)}{away}"
         middle = round(top + (self._bar_line + 0.5) * self._line)
         right = self._width - self._rim
