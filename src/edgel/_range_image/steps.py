@@ -208,7 +208,7 @@ def _steps(
 
 @part
 def _turns_away(row, col, r, c, gap, near, void):
-    """Whether a round surface ends at the farther of two neighbours: beyond it is nothing, and steps grow towards it."""
+    """Whether a round surface ends at the farther of two neighbours: steps grow towards it, and beyond is nothing."""
     height, width = near.shape
     down, right = (r - row, c - col) if gap < 0 else (row - r, col - c)  # to the farther one
     p, q, u, v = (row, col, r, c) if gap < 0 else (r, c, row, col)
