@@ -8,7 +8,7 @@ from edgel._neighbors.spacing import median_spacing
 
 STORED = golden.stored()
 STRAY = 0.005  # share of the edge points, and one more, that rounding may decide
-STRAY_ON_LINES = 0.01  # on scan lines: with other machine code .9 % of the faint ones turned
+STRAY_ON_LINES = 0.03  # on scan lines, whose fits are ill-conditioned: 2.2 % differ between a Xeon and an EPYC
 
 
 @pytest.mark.parametrize("name", STORED)

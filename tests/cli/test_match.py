@@ -98,6 +98,7 @@ def test_what_is_not_there_is_not_found(folder):
     ("words", "code", "message"),
     [
         (("scan.pcd", "none.stl"), 3, "none.stl"),
+        (("part.stl", "scan.pcd"), 2, "the scan comes first"),
         (("scan.pcd", "part.stl", "--scale", "0"), 2, "--scale"),
         (("scan.pcd", "part.stl", "--most", "0"), 2, "--most"),
         (("scan.pcd", "ball.ply", "--most", "2"), 2, "for meshes and STEP"),

@@ -67,6 +67,15 @@ def test_what_a_camera_sees_at_a_glancing_angle_has_none():
         assert not side.any()
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.3])
+@pytest.mark.parametrize("shift", [0.05, 0.3, 0.6])
+def test_a_pipe_seen_from_its_side_turns_away_in_rims_and_no_steps(shift, noise):
+    height = np.sqrt(np.clip(1200 * (26 + shift - np.abs(ROW)), 0, None)) + noise * white(SHAPE)
+    side, rim = found("parallel", np.where(INSIDE, height, np.nan))
+    assert not side.any()
+    assert np.array_equal(rim, INSIDE & ((np.abs(ROW) > 25) | (np.abs(COL) > 35)))
+
+
 def test_a_plate_before_a_slanted_wall():
     depth = 100 / (1 + 1.0 * COL / 90)
     plate = (np.abs(COL) < 10) & (np.abs(ROW) < 12)

@@ -21,6 +21,7 @@ from edgel._neighbors.spacing import median_spacing
 from edgel._objects import NORMALS
 from edgel._stages import Stages
 from edgel.cloud import Cloud
+from edgel.io import READERS
 from edgel.matching import FILES, SURE, Model, Registration, register
 from edgel.plot import picture, save
 
@@ -78,6 +79,8 @@ def match(
             raise Failure(ExitCode.USAGE, f"--scale: expected a number above 0, got {scale:g}")
         if most < 1:
             raise Failure(ExitCode.USAGE, f"--most: expected 1 or more, got {most}")
+        if Path(source).suffix.lower() in FILES and Path(source).suffix.lower() not in READERS:
+            raise Failure(ExitCode.USAGE, f"{source}: is no scan but a part; the scan comes first, then the part")
         reading = files.Reading(intrinsics, columns)
         files.check_input(part, files.Reading())
         with failing_as(ExitCode.INPUT, part):

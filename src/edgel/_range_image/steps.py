@@ -22,6 +22,7 @@ CHAIN = 8  # pixels: chains of both sides that are shorter are specks
 SHEER = 4.0, 4  # times all that, and pixels: steps so high need no longer chain
 BRIDGE = 2  # pixels: a hole no wider is bridged; where it slants, it may be BRIDGED wide along rows or columns
 BRIDGED = 5
+LIMB = 2.5  # times the step before: the last step of a round surface that turns away, 1 / (sqrt(2) - 1) at most
 NEARBY = 2  # cells within which the window of a pixel's own side lies
 HELD = 0.25  # of the gap beside it, within which neighbours hold a pixel that no window fits
 _SPREAD = 0.7, 1.0364  # quantile of chance that tells its spread, and the normal distribution's: chance has long tails
@@ -187,6 +188,8 @@ def _steps(
                 spacing = unit * max(here, near[r, c]) if central else unit
                 if not abs(gap) > LEAST * spacing or not _steepest(row, col, r, c, dr, dc, gap, near, smear):
                     continue
+                if r + c == row + col + 1 and _turns_away(row, col, r, c, gap, near, void):
+                    continue
                 sigma, value = noise[i, j], 0.0
                 for apart in range(min(smear, bridged) + 1):
                     p, q, u, v = row - apart * dr, col - apart * dc, r + apart * dr, c + apart * dc
@@ -201,6 +204,20 @@ def _steps(
                     step[row, col], side[row, col] = value, 4 if gap > 0 else 2
                 if value > step[r, c]:
                     step[r, c], side[r, c] = value, 2 if gap > 0 else 4
+
+
+@part
+def _turns_away(row, col, r, c, gap, near, void):
+    """Whether a round surface ends at the farther of two neighbours: steps grow towards it, and beyond is nothing."""
+    height, width = near.shape
+    down, right = (r - row, c - col) if gap < 0 else (row - r, col - c)  # to the farther one
+    p, q, u, v = (row, col, r, c) if gap < 0 else (r, c, row, col)
+    before, beside, beyond, away = p - down, q - right, u + down, v + right
+    if before < 0 or beside < 0 or before >= height or beside >= width:
+        return False
+    if 0 <= beyond < height and 0 <= away < width and not void[beyond, away]:
+        return False
+    return abs(gap) <= LIMB * (near[before, beside] - near[p, q])
 
 
 @part

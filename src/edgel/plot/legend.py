@@ -100,7 +100,7 @@ class Legend:
         for placed in self._placed:
             self._draw_entry(draw, placed.entry, placed.left, top + (placed.line + 0.5) * self._line, ink)
         length = round_length(_BAR * self._width * pixel)
-        away = "" if np.isnan(distance) else f" at distance {distance:.2g}"
+        away = "" if np.isnan(distance) else f" at distance {two_digits(distance)}"
         label = f"{length:g} unit{'s' * (length != 1)}{away}"
         middle = round(top + (self._bar_line + 0.5) * self._line)
         right = self._width - self._rim
@@ -161,3 +161,14 @@ def round_length(longest: float) -> float:
     """
     power = 10.0 ** np.floor(np.log10(longest))
     return float(max(power * step for step in (1, 2, 5) if power * step <= longest * (1 + 1e-9)))
+
+
+def two_digits(length: float) -> str:
+    """Return a length with two digits, and no power of ten as far as it goes.
+
+    Examples
+    --------
+    >>> two_digits(283.4), two_digits(0.0471)
+    ('280', '0.047')
+    """
+    return f"{float(f'{length:.2g}'):g}"
