@@ -1,6 +1,6 @@
 """Train the trees of `edgel._surface` on random scenes of `edgel.synth`, and write their weights into the package.
 
-Run: python training/train.py [--scenes 2000] (15 minutes on two cores; evidence is kept in training/cache). Needs
+Run: python training/train.py [--scenes 2200] (half an hour on two cores; evidence is kept in training/cache). Needs
 `pip install edgel[train]`. Nothing of the benchmark and no real data is seen in training: see `examples.example`.
 
 The trees of both screenings, by leaves of an octree and by points, say where an edge could be; the others learn from
@@ -15,7 +15,6 @@ import argparse
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from itertools import starmap
 from multiprocessing import get_context
 from multiprocessing.pool import Pool
 from pathlib import Path
@@ -31,7 +30,7 @@ from edgel._surface.classify import SECOND as LIKELY
 from edgel._surface.evidence import Evidence
 from edgel._surface.forest import Forest, evaluate, read_forests, write_forests
 from edgel._surface.screen import POINT as SCREENED
-from edgel._surface.training import add_context, mean, screen_cloud, screening_features
+from edgel._surface.training import add_context, blend, screen_cloud, screening_features
 
 CACHE = Path(__file__).parent / "cache"
 OUT = Path(edgel._surface.__file__).parent / "weights.npz"
@@ -43,6 +42,7 @@ TURNS = 3  # ways in which each is turned for the leaves, whose cells lie along 
 LOOSE = 0.5  # of the screening's threshold: points that it would nearly let through are gathered in training too
 UNLIKELY = 0.02  # share of all the others
 NEAR, SHARE_NEAR, SHARE_FAR = 3.0, 0.4, 0.15  # of points that are no edge, within so many spacings of one or not
+OUTDOORS = 0.4  # weight of the forests that have seen landscapes: one half costs eaves, a quarter leaves crowns full
 VAGUE = 0.07  # of its spread among the scenes: error added, point by point, to the cloud's statistics
 OPTIONS = {
     "objective": "binary",
@@ -106,7 +106,7 @@ class Table:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scenes", type=int, default=2000)
+    parser.add_argument("--scenes", type=int, default=2200)
     parser.add_argument("--out", type=Path, default=OUT)
     options = parser.parse_args()
     CACHE.mkdir(parents=True, exist_ok=True)
@@ -128,7 +128,8 @@ def one_thread() -> None:
 
 def train_screenings(pool: Pool, scenes: int) -> dict[str, Forest]:
     """Train the forests of both screenings."""
-    points, leaves = (Table.join(tables) for tables in zip(*pool.imap(cheap_evidence, range(scenes)), strict=True))
+    seeds = [seed for seed in range(2 * scenes) if not is_landscape(seed)][:scenes]
+    points, leaves = (Table.join(tables) for tables in zip(*pool.imap(cheap_evidence, seeds), strict=True))
     cloud = features.POINT.block("cloud")
     spread = points.features[:, cloud].std(axis=0)
     np.save(SPREAD, spread)
@@ -203,8 +204,8 @@ def train_first(pool: Pool, scenes: int) -> tuple[dict[str, Forest], list[dict[s
     wanted = [(kind, half) for half in (None, 0, 1) for kind in KINDS]
     jobs = [(kind, FIRST[kind], half, outdoors) for kind, half in wanted for outdoors in (False, True)]
     both = dict(zip(wanted, pairs_of(pool.imap(train, jobs)), strict=True))
-    first = {f"first {kind}": mean(*both[kind, None]) for kind in KINDS}
-    return first, [{kind: mean(*both[kind, half]) for kind in KINDS} for half in (0, 1)]
+    first = {f"first {kind}": blend(*both[kind, None], OUTDOORS) for kind in KINDS}
+    return first, [{kind: blend(*both[kind, half], OUTDOORS) for kind in KINDS} for half in (0, 1)]
 
 
 def train_second(pool: Pool, scenes: int, halves: list[dict[str, Forest]]) -> dict[str, Forest]:
@@ -213,7 +214,8 @@ def train_second(pool: Pool, scenes: int, halves: list[dict[str, Forest]]) -> di
     keep(pool.imap(evidence_in_context, jobs, chunksize=4))
     print("the first trees are trained", flush=True)
     jobs = [(kind, SECOND[kind], None, outdoors) for kind in KINDS for outdoors in (False, True)]
-    return dict(zip(KINDS, starmap(mean, pairs_of(pool.imap(train, jobs))), strict=True))
+    pairs = pairs_of(pool.imap(train, jobs))
+    return {kind: blend(*pair, OUTDOORS) for kind, pair in zip(KINDS, pairs, strict=True)}
 
 
 def keep(tables: Iterable[Table]) -> Table:

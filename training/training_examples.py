@@ -8,7 +8,7 @@ import random_scenes
 import reliefs
 from random_scenes import Example
 
-RELIEFS, LANDSCAPES = 0.12, 0.12  # share of the examples
+RELIEFS, LANDSCAPES = 0.1, 0.12  # share of the examples
 
 
 def example(seed: int) -> Example:

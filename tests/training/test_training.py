@@ -13,7 +13,7 @@ from edgel._surface.coarser import CELL
 from edgel._surface.features import LEAF, NUM_EVIDENCE, NUM_SCREEN, POINT
 from edgel._surface.forest import evaluate, load_forests
 from edgel._surface.smoothing import smoothed
-from edgel._surface.training import add_context, mean, screen_cloud, screening_features
+from edgel._surface.training import add_context, blend, screen_cloud, screening_features
 
 
 @pytest.fixture(scope="module", params=[0, 1, 13])  # a whole surface, a view, a relief
@@ -37,15 +37,15 @@ def test_the_seed_decides():
     assert not np.array_equal(one.xyz, other.xyz)
 
 
-def test_the_mean_of_two_forests_is_that_of_their_logits():
+def test_blended_forests_have_the_mean_of_both_logits():
     forests = load_forests()
     rows = np.random.default_rng(0).random((500, len(POINT)), np.float32)
     one, other = forests["crease"], forests["outline"]
-    p, q, both = (evaluate(forest, rows) for forest in (one, other, mean(one, other)))
-    open_ = (np.minimum(p, q) > 1e-9) & (np.maximum(p, q) < 1 - 1e-9)
-    assert open_.mean() > 0.5
-    logit = [np.log(each[open_] / (1 - each[open_])) for each in (p, q, both)]
-    np.testing.assert_allclose(logit[2], (logit[0] + logit[1]) / 2, atol=1e-5)
+    p, q, both = (evaluate(forest, rows) for forest in (one, other, blend(one, other, 0.25)))
+    inner = (np.minimum(p, q) > 1e-9) & (np.maximum(p, q) < 1 - 1e-9)
+    assert inner.mean() > 0.5
+    p, q, both = (np.log(each[inner] / (1 - each[inner])) for each in (p, q, both))
+    np.testing.assert_allclose(both, 0.75 * p + 0.25 * q, atol=1e-5)
 
 
 def test_an_eighth_of_the_examples_are_landscapes():
