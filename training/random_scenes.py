@@ -8,9 +8,6 @@ import numpy as np
 from random_solids import log_uniform, solid
 
 from edgel import metrics, synth
-from edgel._neighbors.kdtree import build_index
-from edgel._surface.coarser import CELL
-from edgel._surface.smoothing import smoothed
 from edgel.edges import EdgeKind
 from edgel.synth import Scene
 
@@ -19,8 +16,6 @@ MIN_TURN = np.radians(25.0)  # a crease that turns less is neither learned nor u
 OWN = 1.5  # spacings within which a point can be a stretch of an edge's own
 VIEWS = 0.35  # share of the scenes that are seen from one place
 IN_STEPS = 0.4  # share of the views that are those of a depth camera
-COARSER = 0.4  # share of the noisy surfaces that are seen by the means of cells, as the detector sees them too
-NOISY = 0.6  # spacings of noise from which on it does
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +41,6 @@ class Example:
 def make(rng: np.random.Generator) -> Example:
     """Make the example of a solid's scene."""
     made = scene(rng)
-    if not made.cloud.is_organized and _noise(made) >= NOISY and rng.random() < COARSER:
-        made = by_cells(made)
     true, counts = labels(made)
     return Example(made.cloud.xyz[np.isfinite(made.cloud.xyz).all(axis=1)], true, counts, made.spacing)
 
@@ -95,28 +88,6 @@ def in_steps(scene: Scene, projection: str, rng: np.random.Generator) -> Scene:
     else:
         moved = xyz * (measured / depth)[:, None]
     return replace(scene, cloud=replace(scene.cloud, xyz=moved))
-
-
-def _noise(scene: Scene) -> float:
-    """Deviation of a scene's points from where they would be without noise, in spacings."""
-    return float((scene.cloud.xyz - scene.noise_free)[~scene.outlier].std() / scene.spacing)
-
-
-def by_cells(scene: Scene) -> Scene:
-    """See a surface by the means of its smoothed points in cells: what `edgel._surface.coarser` looks at."""
-    xyz, size = smoothed(build_index(scene.cloud.xyz)).by_point(), CELL * scene.spacing
-    _, cell, count = np.unique(np.floor(xyz / size), axis=0, return_inverse=True, return_counts=True)
-
-    def mean(values: np.ndarray) -> np.ndarray:
-        return np.column_stack([np.bincount(cell.ravel(), column) for column in values.T]) / count[:, None]
-
-    return replace(
-        scene,
-        cloud=replace(scene.cloud, xyz=mean(xyz)),
-        noise_free=mean(scene.noise_free),
-        outlier=mean(scene.outlier[:, None])[:, 0] > 0.5,
-        spacing=size,
-    )
 
 
 def labels(scene: Scene) -> tuple[np.ndarray, np.ndarray]:

@@ -2,14 +2,11 @@
 
 import numpy as np
 import pytest
-from random_scenes import by_cells, labels
 from training_examples import example, is_landscape
 
-from edgel import synth
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.scan_lines import scan_line_stretch
 from edgel._surface import classify, cloud_statistics, screen
-from edgel._surface.coarser import CELL
 from edgel._surface.features import LEAF, NUM_EVIDENCE, NUM_SCREEN, POINT
 from edgel._surface.forest import evaluate, load_forests
 from edgel._surface.smoothing import smoothed
@@ -54,16 +51,6 @@ def test_an_eighth_of_the_examples_are_landscapes():
     made = example(landscapes[0])
     assert made.spacing == 1.0
     assert np.ptp(made.xyz[:, :2]) > np.ptp(made.xyz[:, 2])
-
-
-def test_noisy_surfaces_are_seen_by_cells_too():
-    scene = synth.sample(synth.stepped_block(), spacing=4.0, noise=1.0, seed=3)
-    made = by_cells(scene)
-    assert made.spacing == pytest.approx(CELL * scene.spacing)
-    assert 1.5 < len(scene.cloud.xyz) / len(made.cloud.xyz) < 4
-    true, counts = labels(made)
-    assert 0.02 < true.any(axis=1).mean() < 0.6
-    assert counts.all()
 
 
 def test_screening_features_are_in_the_layouts(made):
