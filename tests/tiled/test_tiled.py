@@ -220,11 +220,68 @@ def test_scans_of_one_file_are_points_of_the_cloud(strip, whole, tmp_path):
     check_same(tiled.detect([tmp_path / "a.npz"], tmp_path / "out", tile_points=5_000), whole, [len(strip)])
 
 
-def test_much_noise_is_refused(strip, tmp_path):
-    noisy = strip + np.random.default_rng(0).normal(0, 1.0, strip.shape)
-    np.save(tmp_path / "noisy.npy", noisy)
-    with pytest.raises(ValueError, match="smoothed away first"):
-        tiled.detect([tmp_path / "noisy.npy"], tmp_path / "out", tile_points=3_500)
+@pytest.fixture(scope="module")
+def noisy(strip):
+    """The street under noise of a spacing, with a few points far off."""
+    rng = np.random.default_rng(0)
+    noisy = strip + rng.normal(0, 1.0, strip.shape)
+    return np.concatenate([noisy, noisy[rng.integers(0, len(noisy), 40)] + rng.normal(0, 12.0, (40, 3))])
+
+
+@pytest.fixture
+def noisy_files(noisy, tmp_path):
+    names = [str(tmp_path / f"{number}.npy") for number in range(2)]
+    for name, part in zip(names, np.array_split(noisy, 2), strict=True):
+        np.save(name, part)
+    return names
+
+
+def stored(out, step):
+    """The results of a step at all tiles."""
+    return [np.load(path) for path in sorted((out / "work" / step).glob("*.npz"))]
+
+
+@pytest.mark.parametrize("tile_points", [1_000, 4_000, 10**6])
+def test_noise_is_smoothed_and_looked_at_more_coarsely_in_tiles_too(noisy, noisy_files, tmp_path, tile_points):
+    found = tiled.detect(noisy_files, tmp_path / "out", tile_points=tile_points)
+    check_same(found, edgel.detect(noisy, method="surface"), lengths_of(noisy_files))
+    carried = sum(len(tile["key"]) for tile in stored(tmp_path / "out", "carry"))
+    assert carried > 50
+    moved = [np.linalg.norm(tile["seen"] - tile["xyz"], axis=1) for tile in stored(tmp_path / "out", "classify")]
+    assert np.concatenate(moved).max() > 5.0  # farther than to the next tile's points
+
+
+def test_faces_of_a_coarser_look_are_those_that_are_asked_for(noisy, noisy_files, tmp_path):
+    asked = {"viewpoint": noisy.mean(axis=0) + [0, 0, 900.0], "num_neighbors": 30, "min_strength": 0.3}
+    found = tiled.detect(noisy_files, tmp_path / "out", tile_points=4_000, **asked)
+    check_same(found, edgel.detect(noisy, method="surface", **asked), lengths_of(noisy_files))
+
+
+def test_a_noisy_solid_is_told_its_outside_in_tiles(tmp_path):
+    xyz = synth.sample(synth.stepped_block(), pattern="blue_noise", spacing=1.8, noise=1.0, seed=3).cloud.xyz
+    np.save(tmp_path / "block.npy", xyz)
+    found = tiled.detect([tmp_path / "block.npy"], tmp_path / "out", tile_points=2_000, orient="outward")
+    assert found.num_tiles > 2
+    wanted = edgel.detect(xyz, method="surface", orient="outward")
+    check_same(found, wanted, [len(xyz)])
+    assert (wanted.convex != 0).sum() > 100
+
+
+def test_lines_under_noise_are_smoothed_and_stretched_in_tiles(tmp_path):
+    rng = np.random.default_rng(5)
+    x, y = (grid.ravel() for grid in np.meshgrid(np.arange(0, 120.0, 0.2), np.arange(0, 36.0, 1.5)))
+    z = np.where(np.abs(x % 40 - 20) < 11, 9 + 0.6 * (9 - np.abs(y - 17)), 0)
+    xyz = np.column_stack([x, y, z]) + [0.02, 0.005, 0.8] * rng.standard_normal((len(x), 3))
+    np.save(tmp_path / "lines.npy", xyz)
+    found = tiled.detect([tmp_path / "lines.npy"], tmp_path / "out", tile_points=4_000)
+    check_same(found, edgel.detect(xyz, method="surface"), [len(xyz)])
+    assert list((tmp_path / "out" / "work" / "smoothed").iterdir())
+
+
+def test_cells_that_cannot_be_numbered_are_refused(noisy, tmp_path):
+    np.save(tmp_path / "a.npy", np.concatenate([noisy, [[1e12, 1e12, 1e12]]]))
+    with pytest.raises(ValueError, match="more than can be told apart; leave out points that lie far"):
+        tiled.detect([tmp_path / "a.npy"], tmp_path / "out", tile_points=10**6, viewpoint=[0, 0, 1e4])
 
 
 def test_a_disk_that_is_too_small_is_told_before(files, tmp_path, monkeypatch):

@@ -63,10 +63,11 @@ class Carried:
 
     def seen_at(self, points: np.ndarray, own: Strengths) -> tuple[np.ndarray, np.ndarray]:
         """Return those of some points (E,), ascending, that the closer look shows less of, and their sources."""
-        closer = np.zeros(max(points.max(initial=-1), own.points.max(initial=-1)) + 1)
-        closer[own.points] = own.strongest
-        _, rows, carried = np.intersect1d(points, self.strengths.points, assume_unique=True, return_indices=True)
-        less = closer[points[rows]] < self.strengths.strongest[carried]
+        both, rows, carried = np.intersect1d(points, self.strengths.points, assume_unique=True, return_indices=True)
+        closer = np.zeros(len(both))
+        _, here, there = np.intersect1d(both, own.points, assume_unique=True, return_indices=True)
+        closer[here] = own.strongest[there]
+        less = closer < self.strengths.strongest[carried]
         return rows[less], self.sources[carried[less]]
 
 
