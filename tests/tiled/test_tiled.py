@@ -190,10 +190,6 @@ def test_what_is_not_one_cloud_is_refused(strip, tmp_path):
         edgel.write(tmp_path / f"{name}.laz", edgel.Cloud(strip[:500], crs=crs))
     with pytest.raises(ValueError, match=r"b.laz: its CRS"):
         tiled.detect([tmp_path / "a.laz", tmp_path / "b.laz"], tmp_path / "out")
-    grid = np.stack(np.meshgrid(np.arange(20.0), np.arange(20.0), [0.0]), axis=-1)[:, :, 0]
-    np.save(tmp_path / "grid.npy", grid)
-    with pytest.raises(ValueError, match=r"grid.npy: an organized cloud"):
-        tiled.detect([tmp_path / "grid.npy"], tmp_path / "out2")
     with pytest.raises(ValueError, match="named twice"):
         tiled.detect([tmp_path / "a.laz", tmp_path / "a.laz"], tmp_path / "out")
 

@@ -143,8 +143,11 @@ def _look(
         sure = settled(index, screening.leaves, bounds, window.depth, own, window.stretch)
         count = max(plan.options.num_neighbors, FITS[-1][0])
         if count > FITS[-1][0] or window.smoothed:  # farther than evidence asks, or of other points
+            kept = np.maximum(found.crease, found.outline) >= least_probability(plan.options.min_strength)
+            places = np.sort(index.places_of(found.points[kept]))
+            places = places[sure[places]]
             sure = sure.copy()
-            sure[sure] = _fits_within(window, np.flatnonzero(sure), count)
+            sure[places] = _fits_within(window, places, count)
     mine = np.zeros(len(index), bool)
     mine[index.order[sure]] = True
     return found.take(mine[found.points]), np.flatnonzero(own & ~sure)

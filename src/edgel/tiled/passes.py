@@ -35,6 +35,7 @@ from edgel.tiled.measure import (
 )
 from edgel.tiled.outward import agree_in_tile, face_outwards, find_outermost, join_pieces, turn_tile
 from edgel.tiled.plan import Plan
+from edgel.tiled.scans import see_scans
 from edgel.tiled.smooth import smooth_tile
 
 
@@ -55,6 +56,13 @@ def find_edges(engine: Engine, plan: Plan) -> None:
         _look_coarser(engine, plan, whole, line)
     _run(engine, "placing", label_tile, plan, whole, line)
     _turned(engine, plan, whole)
+
+
+def see_all(engine: Engine, plan: Plan, paths: Sequence[str]) -> None:
+    """Find the edges of organized scans among the inputs, each seen from its own sensor."""
+    numbers = [part.number for part in plan.spool.parts if part.num_scans]
+    failed = engine.run("seeing scans", _do, [(see_scans, plan.folder, number) for number in numbers])
+    raise_for(failed, "file", [paths[number] for number in numbers])
 
 
 def _run(
