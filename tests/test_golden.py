@@ -8,7 +8,9 @@ from edgel._neighbors.spacing import median_spacing
 
 STORED = golden.stored()
 STRAY = 0.005  # share of the edge points, and one more, that rounding may decide
-STRAY_ON_LINES = 0.03  # on scan lines, whose fits are ill-conditioned: 2.2 % differ between an Intel Xeon and an AMD EPYC
+STRAY_ON_LINES = (
+    0.03  # on scan lines, whose fits are ill-conditioned: 2.2 % differ between an Intel Xeon and an AMD EPYC
+)
 
 
 @pytest.mark.parametrize("name", STORED)

@@ -100,10 +100,20 @@ def test_normals_of_the_cloud_tell_the_outside_in_tiles(files, strip, tmp_path):
         tiled.detect([names[0], files[1]], tmp_path / "mixed")
 
 
-def test_two_workers_give_the_same(files, whole, tmp_path):
+@pytest.mark.parametrize("noise", [0.0, 1.0])
+def test_four_workers_with_tiles_in_random_order_give_the_same(strip, tmp_path, monkeypatch, noise):
     pytest.importorskip("distributed", reason="the extra tiles is not installed")
-    found = tiled.detect(files, tmp_path / "out", tile_points=3_500, workers=2)
-    check_same(found, whole, lengths_of(files))
+    rng, by_dask = np.random.default_rng(3), engine.Engine._by_dask
+
+    def shuffled(self, task, jobs):
+        order = rng.permutation(list(jobs)).tolist()
+        return by_dask(self, task, {number: jobs[number] for number in order})
+
+    monkeypatch.setattr(engine.Engine, "_by_dask", shuffled)
+    xyz = strip + rng.normal(0, noise, strip.shape)
+    np.save(tmp_path / "a.npy", xyz)
+    found = tiled.detect([tmp_path / "a.npy"], tmp_path / "out", tile_points=2_500, workers=4)
+    check_same(found, edgel.detect(xyz, method="surface"), [len(xyz)])
 
 
 STOPPED = """

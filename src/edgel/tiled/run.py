@@ -152,9 +152,8 @@ def detect(
         jobs = [(work, number, output) for number, output in enumerate(outputs)]
         raise_for(engine.run("writing", write_part, jobs), "file", paths)
     write_index(folder / "edges.vpc", plan, outputs)
-    edges, read = _count(plan)
-    seen = sum(part.num_rows for part in plan.spool.parts if part.num_scans)
-    return Tiled(folder, outputs, plan.num_points + seen, edges, len(plan.tiles), read, notices + _of_scans(plan))
+    points, edges, read = _count(plan)
+    return Tiled(folder, outputs, points, edges, len(plan.tiles), read, notices + _of_scans(plan))
 
 
 def _options(
@@ -232,12 +231,14 @@ def _of_scans(plan: Plan) -> list[str]:
     ]
 
 
-def _count(plan: Plan) -> tuple[int, int]:
-    edges = read = 0
+def _count(plan: Plan) -> tuple[int, int, int]:
+    points, edges, read = plan.num_points, 0, 0
     for tile in range(len(plan.tiles)):
         with plan.load("label", tile) as found:
             edges += len(found["key"])
         with plan.load("classify", tile) as found:
             read += int(found["read"])
-    edges += sum(len(each["row"]) for part in plan.spool.parts for each in load_scans(plan, part))
-    return edges, read
+    for part in plan.spool.parts:
+        for found in load_scans(plan, part):
+            points, edges = points + int(found["points"]), edges + len(found["row"])
+    return points, edges, read
