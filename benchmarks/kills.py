@@ -28,7 +28,7 @@ import numpy as np
 
 VICTIMS = ("client", "disk", "worker", "scheduler", "cluster")
 TILE_POINTS = 1_500
-PATIENCE = 60.0  # seconds that a run whose scheduler died may take to say so
+PATIENCE = 120.0  # seconds that a run whose scheduler died may take to say so
 RUN = """
 import sys
 from edgel import tiled
@@ -170,7 +170,7 @@ def strike(victim: str, run: Run, out: Path, on: Cluster | None, rng: random.Ran
 def kills(victim: str, moments: int, folder: Path, files: list[str], wanted: str, rng: random.Random) -> str:
     """Kill so many runs, each once, and finish them; returns a row of the table."""
     alone = victim in ("client", "disk")
-    same = twice = flying = told = by_itself = 0
+    same = twice = flying = told = hung = by_itself = 0
     done = []
     for moment in range(moments):
         place = folder / f"{victim}{moment}"
@@ -189,6 +189,7 @@ def kills(victim: str, moments: int, folder: Path, files: list[str], wanted: str
                 by_itself += not said
             else:
                 said = run.end(PATIENCE)
+                hung += "stopped" in said
                 told += bool(said) and "stopped" not in said
             if victim in ("scheduler", "cluster") and on is not None:
                 for worker in on.workers:
@@ -205,7 +206,8 @@ def kills(victim: str, moments: int, folder: Path, files: list[str], wanted: str
             same += digest(out) == wanted
     return (
         f"| {victim} | {same} of {moments} | {twice} | {flying} | {min(done):.0%} to {max(done):.0%} | "
-        f"{by_itself if victim == 'worker' else '-'} | {told if victim in ('disk', 'scheduler') else '-'} |"
+        f"{by_itself if victim == 'worker' else '-'} | "
+        f"{f'{told}, {hung} hung' if victim in ('disk', 'scheduler') else '-'} |"
     )
 
 

@@ -5,6 +5,7 @@ import os
 import socket
 import subprocess
 import sys
+import time
 from collections import namedtuple
 from itertools import pairwise
 from pathlib import Path
@@ -362,6 +363,20 @@ def test_tiles_share_no_point_and_leave_none_out(files, strip, tmp_path):
     assert len(np.unique(np.concatenate([keys for _, keys in loaded]))) == len(strip)
     assert sorted(map(tuple, np.concatenate([xyz for xyz, _ in loaded]))) == sorted(map(tuple, strip))
     assert all(a.high != b.high or a.low != b.low for a, b in pairwise(plan.tiles))
+
+
+def test_a_scheduler_that_is_gone_is_told():
+    distributed = pytest.importorskip("distributed", reason="the extra tiles is not installed")
+
+    def lose(line):
+        client.cancel([distributed.Future(key, client) for key in list(client.futures)], force=True)
+
+    with (
+        distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0") as cluster,
+        distributed.Client(cluster) as client,
+        pytest.raises(ConnectionError, match="of 5 tasks not known to be done; start one and go on"),
+    ):
+        engine.Engine(client, lose).run("waiting", time.sleep, [(0.2,)] * 5)
 
 
 def test_several_workers_need_dask(monkeypatch):
