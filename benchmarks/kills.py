@@ -1,9 +1,9 @@
 """Runs in tiles that are killed at random moments, and the same command again: is the answer the undisturbed run's?
 
-Run: python benchmarks/kills.py [client worker scheduler cluster disk] [--moments 10]; prints a table in Markdown. A moment is a random
-line of the run's progress and a random part of the time to the next. What dies: "client", a run in one process; of a run on a cluster
-of two workers one "worker", the "scheduler", or the client ("cluster"); "disk": the file system of a run in one process fills up (root
-alone may mount one of its own). Done twice are results that were whole when it died and are new after.
+Run: python benchmarks/kills.py [client worker scheduler cluster disk] [--moments 10] [--noise 1]; prints a table in Markdown.
+A moment is a random line of the run's progress and a random part of the time to the next. What dies: "client", a run in one process; of a
+run on a cluster of two workers one "worker", the "scheduler", or the client ("cluster"); "disk": the file system of a run in one process
+fills up (root alone may mount one of its own). Done twice are results that were whole when it died and are new after.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ tiled.detect(files, out, tile_points=int(points), scheduler=scheduler or None, p
 """
 
 
-def street(folder: Path) -> list[str]:
-    """Write a street of houses over uneven ground in two files: 20,000 points."""
+def street(folder: Path, noise: float) -> list[str]:
+    """Write a street of houses over uneven ground in two files: 20,000 points, a spacing of 1."""
     rng = np.random.default_rng(7)
     grid = np.stack(np.meshgrid(np.arange(590.0), np.arange(34.0)), axis=-1).reshape(-1, 2)
     x, y = plan = (grid + rng.uniform(-0.45, 0.45, grid.shape)).T
     roof = (np.abs(x % 40 - 20) < 11) & (np.abs(y - 17) < 9)
-    z = np.sin(x / 40) + np.where(roof, 9 + 0.6 * (9 - np.abs(y - 17)), 0) + 0.03 * rng.standard_normal(len(x))
+    z = np.sin(x / 40) + np.where(roof, 9 + 0.6 * (9 - np.abs(y - 17)), 0) + noise * rng.standard_normal(len(x))
     files = [str(folder / f"{number}.npy") for number in range(2)]
     for number, file in enumerate(files):
         np.save(file, np.column_stack([*plan, z])[number::2])
@@ -122,7 +122,9 @@ def cluster(folder: Path) -> Iterator[Cluster]:
 
 def results(out: Path) -> dict[str, int]:
     """All results that are whole, and when they were written."""
-    whole = [path for path in (out / "work").rglob("*.npz") if not path.name.endswith(".part")]
+    whole = [
+        path for path in (out / "work").rglob("*.np[yz]") if not any(part.endswith(".part") for part in path.parts)
+    ]
     return {str(path.relative_to(out)): path.stat().st_mtime_ns for path in whole}
 
 
@@ -220,11 +222,12 @@ def main() -> None:
     parser.add_argument("victims", nargs="*", default=VICTIMS)
     parser.add_argument("--moments", type=int, default=10)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--noise", type=float, default=0.03, help="of a spacing: what is looked at more coarsely too")
     options = parser.parse_args()
     rng = random.Random(options.seed)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        files = street(folder)
+        files = street(folder, options.noise)
         run = Run.start(files, folder / "undisturbed")
         if error := run.end():
             raise SystemExit(error)

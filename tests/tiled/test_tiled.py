@@ -309,6 +309,14 @@ def test_a_disk_that_fills_up_is_told_by_what_the_first_tiles_took(files, whole,
     check_same(tiled.detect(files, tmp_path / "out", tile_points=3_500), whole, lengths_of(files))
 
 
+def test_a_disk_that_is_too_small_for_what_noise_adds_is_told_before_it_is_written(noisy_files, tmp_path, monkeypatch):
+    usage, free = namedtuple("usage", "total used free"), (BYTES_A_POINT + disk.RESULTS) * sum(lengths_of(noisy_files))
+    monkeypatch.setattr("shutil.disk_usage", lambda path: usage(10**12, 0, free))
+    with pytest.raises(OSError, match="go on with the same call"):
+        tiled.detect(noisy_files, tmp_path / "out", tile_points=3_500)
+    assert not (tmp_path / "out" / "work" / "smoothed").exists()
+
+
 def test_what_others_are_writing_is_left_alone(tmp_path):
     for name in ("a.npz.elsewhere.12.part", f"b.npz.{socket.gethostname()}.{os.getpid()}.part"):
         (tmp_path / name).touch()

@@ -13,9 +13,7 @@ from edgel.tiled.spool import BYTES_A_POINT
 
 _EXPANDS = 8  # bytes of points in the spool for one of a file that does not say how many it has, at most
 RESULTS = 76  # bytes a point of results, as measured on a city of which one point in ten is an edge's
-SMOOTHED = (
-    90  # bytes a point of what noise adds: where it is looked at, 56, and means of cells, 13, with results of theirs
-)
+SMOOTHED = 115  # bytes a point that noise adds: where it is looked at, 56, means of cells, and results of these
 _LABELS = 0.6  # bytes of edge points, labelled and written, over what was kept to find them: measured, 0.5 to 0.6
 
 
