@@ -88,6 +88,7 @@ def test_scans_of_e57_are_taken_apart_by_their_cells(stations, tmp_path):
     for scan, station in zip(scans, stations, strict=True):
         seen = scan.rows >= 0
         np.testing.assert_array_equal(cloud.xyz[scan.rows[seen]], scan.cloud.xyz[seen])
+        assert scan.cloud.viewpoint is not None
         np.testing.assert_allclose(scan.cloud.viewpoint, station.viewpoint)
         assert scan.cloud.is_organized
     found = tiled.detect([tmp_path / "a.e57"], tmp_path / "out", extension=".ply")

@@ -214,7 +214,7 @@ def _merge(scans: list[_Scan]) -> Cloud:
     if not scans:
         return Cloud(np.empty((0, 3)))
     num_invalid = sum(int(scan.invalid.sum()) for scan in scans)
-    metadata = {"e57_num_invalid": num_invalid, "e57_num_scans": len(scans)}
+    metadata: dict[str, Any] = {"e57_num_invalid": num_invalid, "e57_num_scans": len(scans)}
     if len(scans) == 1 and (cells := _cells(scans[0])) is not None:
         scan, (index, shape) = scans[0], cells
         xyz = np.where(scan.invalid[:, None], np.nan, scan.xyz)
