@@ -87,8 +87,7 @@ def measure(
     best = _attempt(shapes, np.arange(len(shapes)), REACH, index, rows, points, spacing, ranges)
     noise = noise_of(best, spacing)
     good = _holds(best, noise, spacing, outline)
-    lines = np.zeros_like(shapes)
-    run_slices(_fit_shapes, len(shapes), lines, *rows, position, False, size=64)
+    lines = lines_through(rows, position)
     for reach, straight in ((_SHORT, False), (REACH, True), (_SHORT, True), (_SHORTEST, False), (_SHORTEST, True)):
         curved = shapes[:, RADIUS] > 0
         which = np.flatnonzero((~good | nearly_straight(best, spacing)) & (curved | (not straight)))
@@ -206,6 +205,13 @@ def circles_through(rows: tuple[np.ndarray, np.ndarray], position: np.ndarray) -
     """Return the circles (K, 13) through edge points, given as rows of `position` and where each circle's begin."""
     shapes = np.zeros((len(rows[1]) - 1, SHAPE))
     run_slices(_fit_shapes, len(shapes), shapes, *rows, position, True, size=64)
+    return shapes
+
+
+def lines_through(rows: tuple[np.ndarray, np.ndarray], position: np.ndarray) -> np.ndarray:
+    """Return the lines (K, 13) through edge points, as `circles_through`."""
+    shapes = np.zeros((len(rows[1]) - 1, SHAPE))
+    run_slices(_fit_shapes, len(shapes), shapes, *rows, position, False, size=64)
     return shapes
 
 
