@@ -26,6 +26,8 @@ _DEEP = 3.9  # spacings: full depth
 _TURN = 0.15  # sine of the angle between faces, at least
 _SMALLEST, _LARGEST = 1.5, 200.0  # spacings: of radii; a larger arc is told from a line by no cloud
 _LOOSE = 0.45  # spacings: edge points of a shape with one face scatter less
+_ROUND, _MOSTLY = 0.12, 4.0
+"""Spacings, and radians: edge points of an arc with one face scatter less, or it goes round by more."""
 _RIPPLE = 0.05  # spacings
 _SAGITTA = 1.5  # spacings: an arc that rises less may be a line
 
@@ -178,10 +180,13 @@ def _holds(fitted: _Attempt, noise: float, spacing: np.ndarray, outline: np.ndar
     counts, sigma = fit[:, _fit.COUNTS : _fit.COUNTS + 2], fit[:, _fit.SIGMA : _fit.SIGMA + 2] / spacing[:, None]
     a, b, c, d = fit[:, _fit.NORMALS : _fit.NORMALS + 4].T
     length = np.maximum((fitted.ranges[:, 1] - fitted.ranges[:, 0]) / spacing, 2.0)
-    with np.errstate(invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         smooth = (sigma < np.maximum(_ROUGH, _ROUGHER * noise)).all(axis=1)
         measured = smooth & (counts.min(axis=1) > _COVERED * _DEEP * length) & (np.abs(a * d - b * c) > _TURN)
         alone = outline & (np.nan_to_num(sigma).max(axis=1) < max(_LOOSE, 1.5 * noise))
+        # Scattered points round a corner, or along a straight eave, lie near some arc too.
+        turns = (fitted.ranges[:, 1] - fitted.ranges[:, 0]) / radius
+        alone &= (radius == 0) | (turns > _MOSTLY) | (np.nan_to_num(sigma).max(axis=1) < _ROUND)
         # A wall that goes in and out as it goes round is several flat ones.
         measured &= ~(fit[:, _fit.RIPPLE] > _RIPPLE * spacing)
     state = fit[:, _fit.STATE]

@@ -15,8 +15,8 @@ from edgel.curves._rows import take_rows
 from edgel.curves._smooth import Smoothed
 from edgel.curves._split import split
 
-_ROUGH = 0.12  # spacings: edge points that scatter less show their curve as it is, straight or not
-_LONG, _POINTS = 4.0, 5
+_ROUGH = 0.08  # spacings: edge points that scatter less show their curve as it is, straight or not
+_LONG, _POINTS = 3.0, 4
 """Spacings, and edge points, of a line at least."""
 _CORRELATED = 2.0  # neighbouring edge points come from nearly the same points: so many count as one
 
@@ -30,8 +30,8 @@ def straighten(
     as they were found, those beside the run too. `owner` (E,) tells what has taken edge points, -1 for nothing.
     """
     chains = Chains(*_rows_of(runs), np.zeros(len(runs), np.bool_))
-    # Twice the spread, since that is of the points as they are, and a split takes half of it.
-    pieces = split(chains, points.position, points.spacing, 2 * smoothed.spread)
+    # A split takes half the spread; points as they were found scatter by all of it, and by more where few take part.
+    pieces = split(chains, points.position, points.spacing, 3 * smoothed.spread)
     number = pieces.stop - pieces.start
     chosen = np.flatnonzero((pieces.shape[:, RADIUS] == 0) & pieces.fits & (number >= _POINTS))
     rows = take_rows((chains.points, np.append(pieces.start, len(chains.points))), chosen)
