@@ -18,6 +18,8 @@ from edgel.curves._split import split
 _ROUGH = 0.08  # spacings: edge points that scatter less show their curve as it is, straight or not
 _LONG, _POINTS = 3.0, 4
 """Spacings, and edge points, of a line at least."""
+_STRENGTH, _STRONGEST = 0.38, 0.5
+"""Mean and largest strength of edge points that no face confirms."""
 _CORRELATED = 2.0  # neighbouring edge points come from nearly the same points: so many count as one
 
 
@@ -29,7 +31,7 @@ def straighten(
     A smoothed run winds where its points scatter, since neighbours are moved alike. So lines are fitted to the points
     as they were found, those beside the run too. `owner` (E,) tells what has taken edge points, -1 for nothing.
     """
-    chains = Chains(*_rows_of(runs), np.zeros(len(runs), np.bool_))
+    chains = Chains(*rows_of_runs(runs), np.zeros(len(runs), np.bool_))
     # A split takes half the spread; points as they were found scatter by all of it, and by more where few take part.
     pieces = split(chains, points.position, points.spacing, 3 * smoothed.spread)
     number = pieces.stop - pieces.start
@@ -45,11 +47,19 @@ def straighten(
     mine = mine[np.argsort(taken[mine], kind="stable")]
     counts = np.bincount(taken[mine], minlength=len(shape))
     rows = take_rows((mine, np.concatenate([[0], np.cumsum(counts)])), np.flatnonzero(counts >= _POINTS))
+    rows = take_rows(rows, np.flatnonzero(are_strong(rows, points.strength)))
     lines = lines_through(rows, points.position)
     return _as_measured(lines, rows, points.position), mean_of(points.spacing, rows), rows
 
 
-def _rows_of(runs: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+def are_strong(rows: tuple[np.ndarray, np.ndarray], strength: np.ndarray) -> np.ndarray:
+    """Tell which sets of edge points (K,), given as rows and where each begins, are strong enough without faces."""
+    largest = np.maximum.reduceat(strength[rows[0]], rows[1][:-1]) if len(rows[0]) else np.empty(0)
+    return (mean_of(strength, rows) > _STRENGTH) & (largest >= _STRONGEST)
+
+
+def rows_of_runs(runs: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the edge points of all runs, and where each begins."""
     start = np.concatenate([[0], np.cumsum([len(run) for run in runs])]).astype(np.int64)
     return np.concatenate([np.empty(0, np.int64), *runs]), start
 
