@@ -36,7 +36,8 @@ def test_scattered_points_along_two_sides_are_lines_along_them(seed):
     assert not curves.measured[lines].any()
     alike = np.abs(curves.direction[lines][:, :2]).max(axis=1)
     assert (alike > np.cos(np.radians(6))).all()
-    there = np.concatenate([np.linspace(*curves.points_of(k), 200) for k in lines])
+    ends = [curves.points_of(k) for k in lines.tolist()]
+    there = np.concatenate([np.linspace(each[0], each[-1], 200) for each in ends])
     true = np.concatenate([np.linspace((0, 0, 0), (30, 0, 0), 120), np.linspace((30, 0, 0), (30, 20, 0), 80)])
     assert (KDTree(there).query(true)[0] < 0.75).mean() > 0.5
     assert np.median(KDTree(true).query(there)[0]) < 0.25
