@@ -169,7 +169,7 @@ def test_a_tile_that_fails_is_tried_alone_and_named(files, whole, tmp_path, monk
 def test_results_of_something_else_are_refused(files, tmp_path):
     out = tmp_path / "out"
     tiled.detect(files, out, tile_points=10**6)
-    with pytest.raises(ValueError, match=r"another options.*--overwrite"):
+    with pytest.raises(ValueError, match=r"other options \(min_strength 0.5, now 0.4\).*--overwrite"):
         tiled.detect(files, out, tile_points=10**6, min_strength=0.4)
     with pytest.raises(ValueError, match=r"other files.*--overwrite"):
         tiled.detect(files[:2], out, tile_points=10**6)
