@@ -41,8 +41,8 @@ def check_manifest(folder: Path, files: Sequence[str], options: Options) -> list
         unlike = [f"{key} {before.get(key)}, now {now.get(key)}" for key in now if before.get(key) != now[key]]
         if unlike:
             raise ValueError(
-                f"{folder}: holds results of other options ({'; '.join(unlike)}); overwrite them (--overwrite), or name "
-                "another folder"
+                f"{folder}: holds results of other options ({'; '.join(unlike)}); overwrite them (--overwrite), or "
+                "name another folder"
             )
         _compare_inputs(folder, stored["inputs"], wanted["inputs"])
         stored["cpus"] = sorted({*stored["cpus"], cpu})
