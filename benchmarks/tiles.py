@@ -1,6 +1,6 @@
 """Tiles against the whole cloud: a city made file by file, its answer in tiles and at once, time and memory of both.
 
-Run: python benchmarks/tiles.py make FOLDER --millions 10 [--uneven]; then tiled FOLDER OUT [--tile-points N] [--workers N], and
+Run: python benchmarks/tiles.py make FOLDER --millions 10 [--uneven] [--noise N]; then tiled FOLDER OUT [--tile-points N] [--workers N], and
 whole FOLDER OUT, each in a process of its own; then compare OUT OUT2. Times are processor time, memory is the peak of the process.
 """
 
@@ -24,7 +24,7 @@ SIDE = 1000  # of a file in plan, metres: a point a square metre
 FIELDS = ("kind", "strength", "position", "position_std", "scale", "direction", "normals", "angle", "convex")
 
 
-def block(column: int, row: int, *, uneven: bool) -> np.ndarray:
+def block(column: int, row: int, *, uneven: bool, noise: float = 0.03) -> np.ndarray:
     """Points (N, 3) of a square kilometre: hilly ground, gabled houses and trees, jittered about a grid; spacing 1.
 
     Uneven, stretches of ground have a tenth of the points and others three times as many, and some points hang in the air.
@@ -41,18 +41,18 @@ def block(column: int, row: int, *, uneven: bool) -> np.ndarray:
     house = (along < 11) & (across < 7) & ((x // 40 + 3 * (y // 30)) % 5 > 0)
     z = 6 * np.sin(x / 170) * np.cos(y / 140) + np.where(house, 6 + 0.7 * (7 - across), 0.0)
     tree = ((x // 40 + 3 * (y // 30)) % 5 == 0) & (along < 6) & (across < 6) & (rng.random(len(x)) < 0.5)
-    z += np.where(tree, rng.uniform(1, 9, len(x)), 0.0) + 0.03 * rng.standard_normal(len(x))
+    z += np.where(tree, rng.uniform(1, 9, len(x)), 0.0) + noise * rng.standard_normal(len(x))
     if uneven:
         z += np.where(rng.random(len(x)) < 1e-4, 30.0, 0.0)
     return np.column_stack([x, y, z]) + [512_000.0, 5_401_000.0, 80.0]
 
 
-def make(folder: Path, millions: int, *, uneven: bool) -> None:
+def make(folder: Path, millions: int, *, uneven: bool, noise: float) -> None:
     """Write so many files of about a million points, never more than one of them in memory."""
     folder.mkdir(parents=True, exist_ok=True)
     columns = int(np.ceil(np.sqrt(millions)))
     for number in range(millions):
-        np.save(folder / f"{number:05d}.npy", block(number % columns, number // columns, uneven=uneven))
+        np.save(folder / f"{number:05d}.npy", block(number % columns, number // columns, uneven=uneven, noise=noise))
 
 
 def run_tiled(files: list[str], out: Path, options: argparse.Namespace) -> dict[str, Any]:
@@ -109,12 +109,13 @@ def main() -> None:
     parser.add_argument("other", type=Path, nargs="?", help="of compare: where the whole's answer is")
     parser.add_argument("--millions", type=int, default=10)
     parser.add_argument("--uneven", action="store_true")
+    parser.add_argument("--noise", type=float, default=0.03, help="in height, metres; points lie a metre apart")
     parser.add_argument("--tile-points", type=int, default=2_500_000)
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--verbose", action="store_true")
     options = parser.parse_args()
     if options.what == "make":
-        make(options.folder, options.millions, uneven=options.uneven)
+        make(options.folder, options.millions, uneven=options.uneven, noise=options.noise)
         return
     files = sorted(str(path) for path in options.folder.glob("*.npy"))
     if options.what == "tiled":

@@ -8,6 +8,7 @@ import pytest
 
 import edgel
 from edgel import Cloud, synth
+from edgel.matching._prepare import prepare
 
 SPACING = 1.6
 
@@ -119,6 +120,24 @@ def test_edges_that_were_found_before_are_taken():
     edges = [edgel.detect(points, orient="outward") for points in (source, target)]
     answer = edgel.register(source, target, source_edges=edges[0], target_edges=edges[1])
     assert np.allclose(answer.T_target_source, found().T_target_source)
+
+
+def ridge():
+    x, y = np.meshgrid(np.arange(60.0), np.arange(60.0))
+    return np.stack([x, y, -abs(x - 30)], axis=2)
+
+
+@pytest.mark.parametrize("points", [part(), ridge()], ids=["all round", "grid"])
+def test_sides_are_those_of_the_whole_surface(points):
+    """Also of a grid, in which the detector alone would take its view's side for the outside."""
+    asked = prepare(points, None, "part")
+    given = prepare(points, edgel.detect(points, orient="outward"), "part")
+    planes = edgel.estimate_normals(points, orient="outward", num_neighbors=24).normals
+    xyz = points.reshape(-1, 3)
+    nearest = [np.argmin(((xyz - place) ** 2).sum(axis=1)) for place in asked.surface[::20]]
+    np.testing.assert_array_equal(asked.half.frames, given.half.frames)
+    assert len(asked.half)
+    assert ((planes[nearest] * asked.normals[::20]).sum(axis=1) > 0).all()
 
 
 def test_a_slide_along_an_edge_is_said():

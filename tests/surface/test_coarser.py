@@ -14,7 +14,7 @@ from edgel._surface.line import Strengths
 def test_means_of_cells_are_those_of_a_loop_and_do_not_depend_on_the_order():
     rng = np.random.default_rng(0)
     xyz = rng.normal(scale=3.0, size=(2000, 3)) + [500_000.0, -3.0, 0.0]
-    means = means_of_cells(build_index(xyz), 0.7)
+    means, corners = means_of_cells(xyz, 0.7)
     cells = {}
     for point in xyz:
         cells.setdefault(tuple(np.floor(point / 0.7)), []).append(point)
@@ -22,8 +22,9 @@ def test_means_of_cells_are_those_of_a_loop_and_do_not_depend_on_the_order():
     near = metrics.nearest(wanted, means)
     assert len(means) == len(cells)
     assert near.distances.max() < 1e-6
-    again = means_of_cells(build_index(xyz[rng.permutation(len(xyz))]), 0.7)
+    again, _ = means_of_cells(xyz[rng.permutation(len(xyz))], 0.7)
     assert np.array_equal(means, again)
+    assert [*map(tuple, corners)] == sorted(cells)
 
 
 def one_edge(direction):

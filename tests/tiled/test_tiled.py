@@ -5,6 +5,7 @@ import os
 import socket
 import subprocess
 import sys
+import time
 from collections import namedtuple
 from itertools import pairwise
 from pathlib import Path
@@ -100,10 +101,20 @@ def test_normals_of_the_cloud_tell_the_outside_in_tiles(files, strip, tmp_path):
         tiled.detect([names[0], files[1]], tmp_path / "mixed")
 
 
-def test_two_workers_give_the_same(files, whole, tmp_path):
+@pytest.mark.parametrize("noise", [0.0, 1.0])
+def test_four_workers_with_tiles_in_random_order_give_the_same(strip, tmp_path, monkeypatch, noise):
     pytest.importorskip("distributed", reason="the extra tiles is not installed")
-    found = tiled.detect(files, tmp_path / "out", tile_points=3_500, workers=2)
-    check_same(found, whole, lengths_of(files))
+    rng, by_dask = np.random.default_rng(3), engine.Engine._by_dask
+
+    def shuffled(self, task, jobs):
+        order = rng.permutation(list(jobs)).tolist()
+        return by_dask(self, task, {number: jobs[number] for number in order})
+
+    monkeypatch.setattr(engine.Engine, "_by_dask", shuffled)
+    xyz = strip + rng.normal(0, noise, strip.shape)
+    np.save(tmp_path / "a.npy", xyz)
+    found = tiled.detect([tmp_path / "a.npy"], tmp_path / "out", tile_points=2_500, workers=4)
+    check_same(found, edgel.detect(xyz, method="surface"), [len(xyz)])
 
 
 STOPPED = """
@@ -158,7 +169,7 @@ def test_a_tile_that_fails_is_tried_alone_and_named(files, whole, tmp_path, monk
 def test_results_of_something_else_are_refused(files, tmp_path):
     out = tmp_path / "out"
     tiled.detect(files, out, tile_points=10**6)
-    with pytest.raises(ValueError, match=r"another options.*--overwrite"):
+    with pytest.raises(ValueError, match=r"other options \(min_strength 0.5, now 0.4\).*--overwrite"):
         tiled.detect(files, out, tile_points=10**6, min_strength=0.4)
     with pytest.raises(ValueError, match=r"other files.*--overwrite"):
         tiled.detect(files[:2], out, tile_points=10**6)
@@ -190,10 +201,6 @@ def test_what_is_not_one_cloud_is_refused(strip, tmp_path):
         edgel.write(tmp_path / f"{name}.laz", edgel.Cloud(strip[:500], crs=crs))
     with pytest.raises(ValueError, match=r"b.laz: its CRS"):
         tiled.detect([tmp_path / "a.laz", tmp_path / "b.laz"], tmp_path / "out")
-    grid = np.stack(np.meshgrid(np.arange(20.0), np.arange(20.0), [0.0]), axis=-1)[:, :, 0]
-    np.save(tmp_path / "grid.npy", grid)
-    with pytest.raises(ValueError, match=r"grid.npy: an organized cloud"):
-        tiled.detect([tmp_path / "grid.npy"], tmp_path / "out2")
     with pytest.raises(ValueError, match="named twice"):
         tiled.detect([tmp_path / "a.laz", tmp_path / "a.laz"], tmp_path / "out")
 
@@ -220,11 +227,68 @@ def test_scans_of_one_file_are_points_of_the_cloud(strip, whole, tmp_path):
     check_same(tiled.detect([tmp_path / "a.npz"], tmp_path / "out", tile_points=5_000), whole, [len(strip)])
 
 
-def test_much_noise_is_refused(strip, tmp_path):
-    noisy = strip + np.random.default_rng(0).normal(0, 1.0, strip.shape)
-    np.save(tmp_path / "noisy.npy", noisy)
-    with pytest.raises(ValueError, match="smoothed away first"):
-        tiled.detect([tmp_path / "noisy.npy"], tmp_path / "out", tile_points=3_500)
+@pytest.fixture(scope="module")
+def noisy(strip):
+    """The street under noise of a spacing, with a few points far off."""
+    rng = np.random.default_rng(0)
+    noisy = strip + rng.normal(0, 1.0, strip.shape)
+    return np.concatenate([noisy, noisy[rng.integers(0, len(noisy), 40)] + rng.normal(0, 12.0, (40, 3))])
+
+
+@pytest.fixture
+def noisy_files(noisy, tmp_path):
+    names = [str(tmp_path / f"{number}.npy") for number in range(2)]
+    for name, part in zip(names, np.array_split(noisy, 2), strict=True):
+        np.save(name, part)
+    return names
+
+
+def stored(out, step):
+    """The results of a step at all tiles."""
+    return [np.load(path) for path in sorted((out / "work" / step).glob("*.npz"))]
+
+
+@pytest.mark.parametrize("tile_points", [1_000, 4_000, 10**6])
+def test_noise_is_smoothed_and_looked_at_more_coarsely_in_tiles_too(noisy, noisy_files, tmp_path, tile_points):
+    found = tiled.detect(noisy_files, tmp_path / "out", tile_points=tile_points)
+    check_same(found, edgel.detect(noisy, method="surface"), lengths_of(noisy_files))
+    carried = sum(len(tile["key"]) for tile in stored(tmp_path / "out", "carry"))
+    assert carried > 50
+    moved = [np.linalg.norm(tile["seen"] - tile["xyz"], axis=1) for tile in stored(tmp_path / "out", "classify")]
+    assert np.concatenate(moved).max() > 5.0  # farther than to the next tile's points
+
+
+def test_faces_of_a_coarser_look_are_those_that_are_asked_for(noisy, noisy_files, tmp_path):
+    asked = {"viewpoint": noisy.mean(axis=0) + [0, 0, 900.0], "num_neighbors": 30, "min_strength": 0.3}
+    found = tiled.detect(noisy_files, tmp_path / "out", tile_points=4_000, **asked)
+    check_same(found, edgel.detect(noisy, method="surface", **asked), lengths_of(noisy_files))
+
+
+def test_a_noisy_solid_is_told_its_outside_in_tiles(tmp_path):
+    xyz = synth.sample(synth.stepped_block(), pattern="blue_noise", spacing=1.8, noise=1.0, seed=3).cloud.xyz
+    np.save(tmp_path / "block.npy", xyz)
+    found = tiled.detect([tmp_path / "block.npy"], tmp_path / "out", tile_points=2_000, orient="outward")
+    assert found.num_tiles > 2
+    wanted = edgel.detect(xyz, method="surface", orient="outward")
+    check_same(found, wanted, [len(xyz)])
+    assert (wanted.convex != 0).sum() > 100
+
+
+def test_lines_under_noise_are_smoothed_and_stretched_in_tiles(tmp_path):
+    rng = np.random.default_rng(5)
+    x, y = (grid.ravel() for grid in np.meshgrid(np.arange(0, 120.0, 0.2), np.arange(0, 36.0, 1.5)))
+    z = np.where(np.abs(x % 40 - 20) < 11, 9 + 0.6 * (9 - np.abs(y - 17)), 0)
+    xyz = np.column_stack([x, y, z]) + [0.02, 0.005, 0.8] * rng.standard_normal((len(x), 3))
+    np.save(tmp_path / "lines.npy", xyz)
+    found = tiled.detect([tmp_path / "lines.npy"], tmp_path / "out", tile_points=4_000)
+    check_same(found, edgel.detect(xyz, method="surface"), [len(xyz)])
+    assert list((tmp_path / "out" / "work" / "smoothed").iterdir())
+
+
+def test_cells_that_cannot_be_numbered_are_refused(noisy, tmp_path):
+    np.save(tmp_path / "a.npy", np.concatenate([noisy, [[1e12, 1e12, 1e12]]]))
+    with pytest.raises(ValueError, match="more than can be told apart; leave out points that lie far"):
+        tiled.detect([tmp_path / "a.npy"], tmp_path / "out", tile_points=10**6, viewpoint=[0, 0, 1e4])
 
 
 def test_a_disk_that_is_too_small_is_told_before(files, tmp_path, monkeypatch):
@@ -243,6 +307,14 @@ def test_a_disk_that_fills_up_is_told_by_what_the_first_tiles_took(files, whole,
     assert len(list((work / "classify").iterdir())) < len(Plan.read(work).tiles)
     monkeypatch.undo()
     check_same(tiled.detect(files, tmp_path / "out", tile_points=3_500), whole, lengths_of(files))
+
+
+def test_a_disk_that_is_too_small_for_what_noise_adds_is_told_before_it_is_written(noisy_files, tmp_path, monkeypatch):
+    usage, free = namedtuple("usage", "total used free"), (BYTES_A_POINT + disk.RESULTS) * sum(lengths_of(noisy_files))
+    monkeypatch.setattr("shutil.disk_usage", lambda path: usage(10**12, 0, free))
+    with pytest.raises(OSError, match="go on with the same call"):
+        tiled.detect(noisy_files, tmp_path / "out", tile_points=3_500)
+    assert not (tmp_path / "out" / "work" / "smoothed").exists()
 
 
 def test_what_others_are_writing_is_left_alone(tmp_path):
@@ -299,6 +371,20 @@ def test_tiles_share_no_point_and_leave_none_out(files, strip, tmp_path):
     assert len(np.unique(np.concatenate([keys for _, keys in loaded]))) == len(strip)
     assert sorted(map(tuple, np.concatenate([xyz for xyz, _ in loaded]))) == sorted(map(tuple, strip))
     assert all(a.high != b.high or a.low != b.low for a, b in pairwise(plan.tiles))
+
+
+def test_a_scheduler_that_is_gone_is_told():
+    distributed = pytest.importorskip("distributed", reason="the extra tiles is not installed")
+
+    def lose(line):
+        client.cancel([distributed.Future(key, client) for key in list(client.futures)], force=True)
+
+    with (
+        distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0") as cluster,
+        distributed.Client(cluster) as client,
+        pytest.raises(ConnectionError, match="of 5 tasks not known to be done; start one and go on"),
+    ):
+        engine.Engine(client, lose).run("waiting", time.sleep, [(0.2,)] * 5)
 
 
 def test_several_workers_need_dask(monkeypatch):

@@ -1,6 +1,7 @@
 """The viewer in a real browser: Chromium, headless, driven by Playwright."""
 
 import importlib.util
+import re
 
 import numpy as np
 import pytest
@@ -229,6 +230,50 @@ def test_click_shows_the_numbers(page):
     input_of(page, "boundary").click()
 
 
+def test_two_clicks_show_the_distance(page):
+    points = page.locator(".edgel-point")
+    blue = abs(picture(page) - KIND_COLORS[EdgeKind.BOUNDARY]).max(axis=2) < 12
+    rows, columns = np.nonzero(blue)
+    places = []
+    for at in (0, len(rows) // 2):
+        text = points.inner_text() if points.count() else ""
+        page.locator("canvas").last.click(position={"x": int(columns[at]), "y": int(rows[at])})
+        wait_for(lambda text=text: points.count() and points.inner_text() not in ("", text), "the numbers of a point")
+        line = next(line for line in points.inner_text().splitlines() if line.startswith("place on the edge"))
+        places.append(np.array(line.split()[-3:], float))
+    told = next(line for line in points.inner_text().splitlines() if line.startswith("distance"))
+    assert float(told.split()[1]) == pytest.approx(np.linalg.norm(places[1] - places[0]), rel=1e-4)
+    assert page.evaluate("() => Boolean(window.__viserMutable.nodeRefFromName['/distance'])")
+
+
+def test_every_control_has_a_name_and_the_page_a_title(page):
+    assert page.title() == "tee.ply, <b>damaged.ply - edgel view"
+    for role in ("slider", "textbox", "button", "checkbox", "combobox"):
+        controls = page.get_by_role(role)
+        assert controls.count() > 0
+        assert controls.count() == page.get_by_role(role, name=re.compile(r"\w")).count(), role
+    assert page.get_by_role("slider", name="Strength").count() == 1
+
+
+def test_keys_move_a_slider_and_not_the_camera(page):
+    camera = "() => JSON.stringify(window.__viserMutable.camera.position)"
+    before, everything = page.evaluate(camera), shown(page)
+    slider = page.get_by_role("slider", name="Strength")
+    for key, wanted in (("End", 1.0), ("ArrowLeft", 0.99)):
+        slider.press(key, delay=300)
+        wait_for(lambda wanted=wanted: float(slider.get_attribute("aria-valuenow")) == wanted, "the slider to follow")
+    page.wait_for_timeout(500)
+    assert page.evaluate(camera) == before
+    type_number(page, "Strength ≥", 0.5)
+    wait_for(lambda: shown(page) == everything, "all edges")
+
+
+def test_kinds_that_a_cloud_cannot_have_are_grey(page):
+    assert input_of(page, "color").is_disabled()  # there are no colors
+    for possible in ("boundary", "crease", "frame"):
+        assert input_of(page, possible).is_enabled()
+
+
 def test_published_method_beside_with_its_images(page, served):
     choose(page, "Method", "side by side")
     page.get_by_text("tee.ply: edge map").wait_for()
@@ -243,12 +288,7 @@ def test_published_method_beside_with_its_images(page, served):
 def test_crop_and_colors(page):
     before = shown(page)
     page.get_by_text("Crop", exact=True).click()
-    thumb = page.locator("xpath=//label[text()='x (%)']/following::*[contains(@class, 'multi-slider-thumb')][2]")
-    thumb.hover()
-    box = thumb.bounding_box()
-    page.mouse.down()
-    page.mouse.move(box["x"] - 80, box["y"] + box["height"] / 2, steps=5)
-    page.mouse.up()
+    type_number(page, "x to (%)", 60)
     wait_for(lambda: shown(page) < before, "fewer edges")
     wait_for(lambda: "--crop" in page.locator(".edgel-code").inner_text(), "the crop in the command line")
     page.get_by_role("button", name="Whole cloud").click()

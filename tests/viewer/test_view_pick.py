@@ -1,10 +1,22 @@
 """Clicks in the viewer: which edge point was meant, and its numbers."""
 
 import numpy as np
+import pytest
 from hall import TIMEOUT
 
 from edgel import EdgeKind
-from edgel._viewer.pick import Picked, curve_of, curve_places, describe, describe_curve, find, pick, row_of
+from edgel._viewer.pick import (
+    Picked,
+    curve_of,
+    curve_places,
+    describe,
+    describe_curve,
+    describe_distance,
+    find,
+    pick,
+    row_of,
+    summary,
+)
 from edgel._viewer.settings import Settings
 
 
@@ -46,6 +58,18 @@ def test_numbers_of_an_edge_point(open_session, hall_file):
     assert numbers["angle"] == f"{np.degrees(pane.edges.angle[crease]):.1f}°"
     boundary = int(np.flatnonzero(pane.edges.kind == EdgeKind.BOUNDARY)[0])
     assert describe(pane, boundary)["other face's normal"] == "unknown"
+
+
+def test_distance_between_two_edge_points(open_session, hall_file):
+    session = open_session([hall_file])
+    assert session.wait_idle(TIMEOUT)
+    (pane,) = session.panes()
+    assert pane.edges is not None
+    ends = pane.edges.position[[0, -1]]
+    told = describe_distance(pane, 0, pane, len(pane.edges) - 1)
+    assert float(told["distance"]) == pytest.approx(np.linalg.norm(ends[1] - ends[0]), rel=1e-5)
+    np.testing.assert_allclose([float(word) for word in told["from the one before"].split()], ends[1] - ends[0])
+    assert summary(pane, 0).startswith(describe(pane, 0)["kind"])
 
 
 def test_a_click_on_a_curve_tells_its_measures(open_session, hall_file):

@@ -167,10 +167,21 @@ def test_edges_of_color_are_found_when_asked_for(open_session, tmp_path):
     session.settings = Settings(kinds=DEFAULT_KINDS | EdgeKind.COLOR)
     assert session.wait_idle(TIMEOUT)
     (pane,) = session.panes()
-    assert pane.run == Run(0, "edgel", color=True)
+    assert pane.run == Run(0, "edgel", more=EdgeKind.COLOR)
     assert pane.edges is not None
     same(pane.edges, edgel.detect(pane.cloud, kinds=DEFAULT_KINDS | EdgeKind.COLOR))
     assert pane.edges.count_kinds()["color"] > 20
+
+
+def test_the_frame_is_found_when_asked_for(open_session, tmp_path):
+    np.save(tmp_path / "organized.npy", roof(0.0).reshape(-1, len(np.unique(roof(0.0)[:, 1])), 3))
+    session = open_session([str(tmp_path / "organized.npy")])
+    session.settings = Settings(kinds=DEFAULT_KINDS | EdgeKind.FRAME)
+    assert session.wait_idle(TIMEOUT)
+    (pane,) = session.panes()
+    assert pane.edges is not None
+    same(pane.edges, edgel.detect(pane.cloud, kinds=DEFAULT_KINDS | EdgeKind.FRAME))
+    assert pane.edges.count_kinds()["frame"] > 20
 
 
 def test_model_and_command_do_not_load_viser():

@@ -8,8 +8,8 @@ from edgel._kernels.parallel import kernel
 from edgel._neighbors.kdtree import NeighborIndex, build_index
 from edgel._neighbors.knn import visit_neighbors
 from edgel._neighbors.neighborhood import relative
-from edgel._neighbors.normals import fit_planes
-from edgel._neighbors.queries import at_places, every_point
+from edgel._neighbors.normals import fit_nearest
+from edgel._neighbors.queries import Queries, at_places, every_point
 from edgel._neighbors.spacing import disc_spacing
 from edgel._surface import plane_scales
 from edgel._surface.plane_scales import SCALES, fit_scales
@@ -30,10 +30,15 @@ def smoothed(index: NeighborIndex) -> NeighborIndex:
     share = share_of(cloud_noise(index))
     if share == 0.0:
         return index
-    planes, xyz = fit_planes(index, every_point(index), NEIGHBORS), index.by_point()
+    return build_index(move(index, every_point(index), index.by_point(), share))
+
+
+def move(index: NeighborIndex, queries: Queries, xyz: np.ndarray, share: float) -> np.ndarray:
+    """Move points of a cloud, asked for at (M, 3), some of the way to the planes of their nearest, (M, 3) float64."""
+    planes = fit_nearest(index, queries, NEIGHBORS)
     off = (xyz * planes.normals).sum(axis=1) - planes.offset
     moved = xyz - share * off[:, None] * planes.normals
-    return build_index(np.where(np.isfinite(moved), moved, xyz))
+    return np.where(np.isfinite(moved), moved, xyz)
 
 
 def share_of(noise: float) -> float:

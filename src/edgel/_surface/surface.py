@@ -108,7 +108,7 @@ class Surface:
         """The means of cells, where the noise asks for them."""
         if self._coarsest or self.smoothed is self.index:
             return None
-        xyz = means_of_cells(self.smoothed, self._cell)
+        xyz, _ = means_of_cells(self.smoothed.by_point(), self._cell)
         return Surface(xyz, self._stages, coarsest=True) if len(xyz) >= FEWEST else None
 
     @cached_property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,7 @@ _CURVE_COLORS = {
 _STILL = 0.01  # scene units: a camera that was not moved by more was not moved by the user
 _ABOVE = 0.12  # scene units from a cloud to its name
 _MARK_COLOR = (255, 220, 0)
+_DISTANCE_COLOR = (0, 0, 0)
 
 
 class Canvas:
@@ -97,14 +99,31 @@ class Canvas:
 
         client.camera.on_update(resized)
 
-    def mark(self, picked: Picked | None) -> None:
-        """Put a ball on the edge point that was clicked."""
-        self._remove("/picked")
-        if picked is not None:
-            at = self.shown[picked.pane][picked.edge]
-            radius = max(0.015, self.edge_size(picked.pane))
-            self._nodes["/picked"] = self._server.scene.add_icosphere(
-                "/picked", radius=radius, color=_MARK_COLOR, opacity=0.8, position=at.astype(float)
+    def mark(self, picked: Sequence[Picked], words: str = "", distance: str = "") -> None:
+        """Put a ball on edge points that were clicked, words beside the last, and a line from the one before.
+
+        Parameters
+        ----------
+        picked : sequence of Picked
+            None, one, or two.
+        words : str
+            Stand beside the last.
+        distance : str
+            Stands beside the line between two; without it there is none.
+        """
+        for name in ("/picked", "/picked-before", "/words", "/distance", "/distance-words"):
+            self._remove(name)
+        places = [self.shown[one.pane][one.edge].astype(float) for one in picked]
+        scene = self._server.scene
+        for name, one, at in zip(("/picked", "/picked-before"), picked[::-1], places[::-1], strict=False):
+            radius = max(0.015, self.edge_size(one.pane))
+            self._nodes[name] = scene.add_icosphere(name, radius=radius, color=_MARK_COLOR, opacity=0.8, position=at)
+        if words:
+            self._nodes["/words"] = scene.add_label("/words", words, position=places[-1], anchor="bottom-left")
+        if distance:
+            self._segments("/distance", (np.array([places], np.float32), np.full((1, 2, 3), _DISTANCE_COLOR, np.uint8)))
+            self._nodes["/distance-words"] = scene.add_label(
+                "/distance-words", distance, position=(places[0] + places[1]) / 2, anchor="top-center"
             )
 
     def edge_size(self, pane: int) -> float:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
 import viser
 
 from edgel._viewer import texts
@@ -65,7 +66,10 @@ class Controls:
             self.size = gui.add_slider("Point size", 0.5, 4.0, 0.1, 1.0)
             self.look = gui.add_button("Show everything", hint="Put the camera back to where it began")
         with gui.add_folder("Crop", expand_by_default=False):
-            self.crop = [gui.add_multi_slider(f"{axis} (%)", 0, 100, 1, (0, 100), min_range=1) for axis in "xyz"]
+            self.crop = [
+                (gui.add_slider(f"{axis} from (%)", 0, 99, 1, 0), gui.add_slider(f"{axis} to (%)", 1, 100, 1, 100))
+                for axis in "xyz"
+            ]
             self.whole = gui.add_button("Whole cloud")
         self.images = gui.add_folder("The paper's images", visible=False)
         with self.images:
@@ -94,7 +98,7 @@ class Controls:
             strength=float(self.strength.value),
             angle=math.radians(self.angle.value),
             kinds=kinds,
-            crop=tuple((low / 100, high / 100) for low, high in (slider.value for slider in self.crop)),
+            crop=tuple(_share(low.value, high.value) for low, high in self.crop),
             coloring=Coloring(self.coloring.value),
             by_strength=self.edge_colors.value == "strength",
             tangents=self.tangents.value,
@@ -105,17 +109,19 @@ class Controls:
         )
 
     def offer(self, sources: Sequence[Source], colorings: list[Coloring]) -> None:
-        """Offer only what the files carry: colorings, edges of colors, and more points than are drawn at first."""
+        """Offer only what the files carry: colorings, and more points than are drawn at first."""
         names = tuple(coloring.value for coloring in Coloring if coloring in colorings)
         if self.coloring.options != names:
             self.coloring.options = names
-        self.kinds[EdgeKind.COLOR].visible = any(source.has_color for source in sources)
         self.every_point.visible = any(len(source.few) < len(source.shown) for source in sources)
 
-    def fit_method(self, settings: Settings) -> None:
-        """Grey out what the method shown does not heed."""
-        for handle in (self.strength, self.angle, *self.kinds.values()):
-            handle.disabled = "edgel" not in settings.methods
+    def fit(self, panes: Sequence[Pane], settings: Settings) -> None:
+        """Grey out what the method shown does not heed, and kinds of edge that none of the clouds can have."""
+        heeded = "edgel" in settings.methods
+        self.strength.disabled = self.angle.disabled = not heeded
+        possible = _possible_kinds(panes)
+        for kind, box in self.kinds.items():
+            box.disabled = not (heeded and kind in possible)
         self.images.visible = "paper" in settings.methods
 
     def choose_pane(self, panes: list[Pane]) -> Pane | None:
@@ -131,10 +137,36 @@ class Controls:
             *(self.method, self.strength, self.angle, self.scale, self.coloring, self.edge_colors),
             *(self.tangents, self.normals, self.curves, self.every_point, self.size),
             *self.kinds.values(),
-            *self.crop,
+            *(slider for pair in self.crop for slider in pair),
         ]
 
     def _uncrop(self, changed: Callable[[], None]) -> None:
-        for slider in self.crop:
-            slider.value = (0, 100)
+        for low, high in self.crop:
+            low.value, high.value = 0, 100
         changed()
+
+
+def _share(low: float, high: float) -> tuple[float, float]:
+    """Return the part of an axis between two percentages, in either order, one percent at least."""
+    low, high = sorted((low, high))
+    return low / 100, max(high, low + 1) / 100
+
+
+def _possible_kinds(panes: Sequence[Pane]) -> EdgeKind:
+    """Return the kinds that edgel's detector can find in some of the clouds, as far as that is known.
+
+    Without a view, near and far sides are told apart on few clouds; the frame is that of an organized cloud's rows and
+    columns.
+    """
+    sides, kinds = EdgeKind.OCCLUDING | EdgeKind.OCCLUDED, EdgeKind.BOUNDARY | EdgeKind.CREASE
+    for pane in panes:
+        found = None if pane.answer is None else pane.answer.edges
+        if pane.method == "paper":
+            continue
+        if pane.source.has_color:
+            kinds |= EdgeKind.COLOR
+        if found is None or found.method != "surface" or np.any(found.kind & sides):
+            kinds |= sides
+        if found is None or found.method == "organized":
+            kinds |= EdgeKind.FRAME
+    return kinds

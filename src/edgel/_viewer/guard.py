@@ -52,8 +52,11 @@ class Guard:
         return not origins or _place(origins[0]) == host
 
     @contextmanager
-    def at_the_door(self) -> Iterator[None]:
-        """Have servers that websockets starts meanwhile ask this guard first, and keep their clients' faults quiet."""
+    def at_the_door(self, finish: Callable[[Response], Response] = lambda answer: answer) -> Iterator[None]:
+        """Have servers that websockets starts meanwhile ask this guard first, and keep their clients' faults quiet.
+
+        `finish` is given what they answer, the page among it.
+        """
         original = websockets.asyncio.server.serve
 
         def serve(*args: Any, process_request: Callable[..., Any], **options: Any) -> Any:
@@ -62,7 +65,7 @@ class Guard:
                     return connection.respond(http.HTTPStatus.FORBIDDEN, _REFUSED)
                 request.path = "/" + request.path.lstrip("/")[len(self.token) :].lstrip("/")
                 answer = process_request(connection, request)
-                return _kept_to_itself(answer) if isinstance(answer, Response) else answer
+                return _kept_to_itself(finish(answer)) if isinstance(answer, Response) else answer
 
             asyncio.get_running_loop().set_exception_handler(lambda loop, context: None)
             options |= {"process_request": ask_first, "logger": _silent_logger(), "max_size": _LARGEST}

@@ -15,7 +15,17 @@ from edgel._viewer.colors import colorings
 from edgel._viewer.commands import command_line, python_lines
 from edgel._viewer.controls import Controls
 from edgel._viewer.latest import Latest
-from edgel._viewer.pick import Picked, Row, curve_places, describe, describe_curve, find, pick, row_of
+from edgel._viewer.pick import (
+    Row,
+    curve_places,
+    describe,
+    describe_curve,
+    describe_distance,
+    find,
+    pick,
+    row_of,
+    summary,
+)
 from edgel._viewer.save import edges_file, picture_file, png
 from edgel._viewer.session import Pane, Session
 from edgel.io.errors import describe_error, printable
@@ -38,7 +48,7 @@ class Page:
         self._lock = threading.Lock()
         self._images: dict[str, PaperEdges] = {}
         self._panes: list[Pane] = []
-        self._picked: Row | None = None
+        self._picked: list[Row] = []  # the last two, the newest at the end
         server.gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
         server.gui.set_panel_label("edgel view")
         server.gui.main_panel.dock_right()
@@ -77,7 +87,7 @@ class Page:
         if panes:
             sources = [pane.source for pane in panes]
             controls.offer(sources, [coloring for source in sources for coloring in colorings(source)])
-        controls.fit_method(settings)
+        controls.fit(panes, settings)
         pane = controls.choose_pane(panes)
         controls.status.content = texts.status(session, panes, settings)
         controls.legend.content = texts.legend(panes, settings)
@@ -88,8 +98,8 @@ class Page:
         self._server.flush()
         changed = [pane.edges for pane in panes] != [pane.edges for pane in self._panes]  # Edges equal only themselves
         self._panes = panes
-        if changed and self._picked is not None:
-            self._pick(find(panes, self._picked))
+        if changed and self._picked:
+            self._mark()
         self._show_images(panes)
         lines = (
             {}
@@ -122,7 +132,8 @@ class Page:
         sizes = [self._canvas.edge_size(number) for number in range(len(shown))]
         ray = np.array(event.ray_origin), np.array(event.ray_direction)
         picked = pick(shown, *ray, max_angle=float(reach), radius=max(sizes, default=0.0))
-        self._pick(picked)
+        self._picked = [] if picked is None else [*self._picked[-1:], row_of(self._panes, picked)]
+        self._mark()
         if picked is None:
             self._pick_curve(ray, float(reach))
 
@@ -145,13 +156,22 @@ class Page:
                 describe_curve(curves, int(found[picked.pane][1][picked.edge]))
             )
 
-    def _pick(self, picked: Picked | None) -> None:
-        """Mark an edge point and show its numbers, or none."""
-        self._picked = None if picked is None else row_of(self._panes, picked)
-        self._canvas.mark(picked)
-        self._controls.numbers.content = texts.numbers(
-            None if picked is None else describe(self._panes[picked.pane], picked.edge)
-        )
+    def _mark(self) -> None:
+        """Mark the edge points clicked, if the last is shown, with its numbers and its distance from the other."""
+        found = [find(self._panes, row) for row in self._picked]
+        picked = [one for one in found if one is not None]
+        if not found or found[-1] is None:
+            self._picked = []
+            self._canvas.mark([])
+            self._controls.numbers.content = texts.numbers(None)
+            return
+        first, last = picked[0], picked[-1]
+        pane = self._panes[last.pane]
+        way = {}
+        if first != last and self._panes[first.pane].source is pane.source:
+            way = describe_distance(self._panes[first.pane], first.edge, pane, last.edge)
+        self._canvas.mark(picked if way else [last], summary(pane, last.edge), way.get("distance", ""))
+        self._controls.numbers.content = texts.numbers(way | describe(pane, last.edge))
 
     def _save_edges(self, event: viser.GuiEvent[Any]) -> None:
         pane = self._saved_pane(event)

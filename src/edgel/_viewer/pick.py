@@ -152,6 +152,27 @@ def describe(pane: Pane, edge: int) -> dict[str, str]:
     }
 
 
+def summary(pane: Pane, edge: int) -> str:
+    """Put what matters most of an edge point into a few short lines, to stand beside it."""
+    numbers = describe(pane, edge)
+    lines = [
+        f"{numbers['kind']}, strength {numbers['strength']}",
+        numbers["place on the edge"],
+        f"row {numbers['row']}",
+    ]
+    if numbers["angle"] != "unknown":
+        lines.insert(1, f"angle {numbers['angle']}")
+    return "\n".join(lines)
+
+
+def describe_distance(first: Pane, first_edge: int, last: Pane, last_edge: int) -> dict[str, str]:
+    """Put into words how far an edge point lies from another of the same file, each by its number among those shown."""
+    assert first.edges is not None
+    assert last.edges is not None
+    way = last.edges.position[last_edge] - first.edges.position[first_edge]
+    return {"distance": f"{np.linalg.norm(way):.6g}", "from the one before": _vector(way)}
+
+
 def _degrees(angle: float) -> str:
     return "unknown" if np.isnan(angle) else f"{np.degrees(angle):.1f}°"
 

@@ -17,6 +17,8 @@ METHODS: tuple[Method, ...] = get_args(Method)
 
 LEAST_STRENGTH = 0.2  # what `edgel.detect` is asked for; the slider goes no lower
 
+_NONE = EdgeKind(0)
+
 
 @dataclass(frozen=True)
 class Run:
@@ -29,14 +31,14 @@ class Run:
     method : {"edgel", "paper"}
     scale : float
         See `Settings`.
-    color : bool
-        Whether edges of the colors are looked for.
+    more : EdgeKind
+        Kinds that are looked for beside the usual ones: of color, and the frame.
     """
 
     source: int
     method: Method
     scale: float = 1.0
-    color: bool = False
+    more: EdgeKind = _NONE
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,5 +54,5 @@ def find_edges(cloud: Cloud, run: Run, progress: Callable[[str], None]) -> Edges
     """Run the detector on a cloud; `progress` is called with the name of each stage as it begins."""
     if run.method == "paper":
         return edgel.paper.detect(cloud, scale=run.scale, progress=progress)
-    kinds = DEFAULT_KINDS | EdgeKind.COLOR if run.color else DEFAULT_KINDS
+    kinds = DEFAULT_KINDS | run.more
     return edgel.detect(cloud, kinds=kinds, min_strength=LEAST_STRENGTH, scale=run.scale, progress=progress)

@@ -15,6 +15,7 @@ from typing import Any
 
 import viser
 
+from edgel._viewer.document import dress
 from edgel._viewer.guard import LOCAL, Guard
 from edgel._viewer.page import Page
 from edgel._viewer.session import Session
@@ -80,7 +81,8 @@ def running(
     """Serve the page for as long as the ``with`` lasts; as `serve`, which waits for Ctrl-C."""
     session = Session(paths, reading=reading)
     guard = Guard(host)
-    server = _listen(host, _free_port(host, port), guard)
+    title = ", ".join(source.name for source in session.sources) + " - edgel view"
+    server = _listen(host, _free_port(host, port), guard, title)
     page = Page(server, session)
     try:
         yield Viewer(_address(host, server.get_port(), guard.token), session, page)
@@ -91,9 +93,9 @@ def running(
             server.stop()
 
 
-def _listen(host: str, port: int, guard: Guard) -> viser.ViserServer:
+def _listen(host: str, port: int, guard: Guard, title: str) -> viser.ViserServer:
     """Start viser without its banner, and behind a guard."""
-    with guard.at_the_door(), redirect_stdout(io.StringIO()):
+    with guard.at_the_door(lambda answer: dress(answer, title)), redirect_stdout(io.StringIO()):
         return viser.ViserServer(host, port, verbose=False)
 
 

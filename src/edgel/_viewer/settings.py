@@ -78,8 +78,8 @@ class Settings:
 
     def run(self, source: int, method: Method, *, has_color: bool) -> Run:
         """Return the run that answers these settings for a file; `has_color`: whether it has any colors."""
-        color = method == "edgel" and has_color and EdgeKind.COLOR in self.kinds
-        return Run(source, method, self.scale, color)
+        more = self.kinds & (EdgeKind.FRAME | EdgeKind.COLOR if has_color else EdgeKind.FRAME)
+        return Run(source, method, self.scale, more if method == "edgel" else EdgeKind(0))
 
     def box(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
         """Return the crop box of a cloud that reaches from `low` to `high`, (2, 3); infinite where nothing is cut."""

@@ -26,7 +26,7 @@ _COPY = (
 
 HELP = (
     f"<div style='{_BOX}'><b>Drag</b> turns, <b>wheel</b> zooms, <b>right-drag</b> moves. "
-    "<b>Click an edge point</b> for its numbers.</div>"
+    "<b>Click an edge point</b> for its numbers, another for the distance.</div>"
 )
 
 

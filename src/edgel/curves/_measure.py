@@ -26,6 +26,8 @@ _DEEP = 3.9  # spacings: full depth
 _TURN = 0.15  # sine of the angle between faces, at least
 _SMALLEST, _LARGEST = 1.5, 200.0  # spacings: of radii; a larger arc is told from a line by no cloud
 _LOOSE = 0.45  # spacings: edge points of a shape with one face scatter less
+_ROUND, _MOSTLY = 0.12, 4.0
+"""Spacings, and radians: edge points of an arc with one face scatter less, or it goes round by more."""
 _RIPPLE = 0.05  # spacings
 _SAGITTA = 1.5  # spacings: an arc that rises less may be a line
 
@@ -87,8 +89,7 @@ def measure(
     best = _attempt(shapes, np.arange(len(shapes)), REACH, index, rows, points, spacing, ranges)
     noise = noise_of(best, spacing)
     good = _holds(best, noise, spacing, outline)
-    lines = np.zeros_like(shapes)
-    run_slices(_fit_shapes, len(shapes), lines, *rows, position, False, size=64)
+    lines = lines_through(rows, position)
     for reach, straight in ((_SHORT, False), (REACH, True), (_SHORT, True), (_SHORTEST, False), (_SHORTEST, True)):
         curved = shapes[:, RADIUS] > 0
         which = np.flatnonzero((~good | nearly_straight(best, spacing)) & (curved | (not straight)))
@@ -179,10 +180,13 @@ def _holds(fitted: _Attempt, noise: float, spacing: np.ndarray, outline: np.ndar
     counts, sigma = fit[:, _fit.COUNTS : _fit.COUNTS + 2], fit[:, _fit.SIGMA : _fit.SIGMA + 2] / spacing[:, None]
     a, b, c, d = fit[:, _fit.NORMALS : _fit.NORMALS + 4].T
     length = np.maximum((fitted.ranges[:, 1] - fitted.ranges[:, 0]) / spacing, 2.0)
-    with np.errstate(invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         smooth = (sigma < np.maximum(_ROUGH, _ROUGHER * noise)).all(axis=1)
         measured = smooth & (counts.min(axis=1) > _COVERED * _DEEP * length) & (np.abs(a * d - b * c) > _TURN)
         alone = outline & (np.nan_to_num(sigma).max(axis=1) < max(_LOOSE, 1.5 * noise))
+        # Scattered points round a corner, or along a straight eave, lie near some arc too.
+        turns = (fitted.ranges[:, 1] - fitted.ranges[:, 0]) / radius
+        alone &= (radius == 0) | (turns > _MOSTLY) | (np.nan_to_num(sigma).max(axis=1) < _ROUND)
         # A wall that goes in and out as it goes round is several flat ones.
         measured &= ~(fit[:, _fit.RIPPLE] > _RIPPLE * spacing)
     state = fit[:, _fit.STATE]
@@ -206,6 +210,13 @@ def circles_through(rows: tuple[np.ndarray, np.ndarray], position: np.ndarray) -
     """Return the circles (K, 13) through edge points, given as rows of `position` and where each circle's begin."""
     shapes = np.zeros((len(rows[1]) - 1, SHAPE))
     run_slices(_fit_shapes, len(shapes), shapes, *rows, position, True, size=64)
+    return shapes
+
+
+def lines_through(rows: tuple[np.ndarray, np.ndarray], position: np.ndarray) -> np.ndarray:
+    """Return the lines (K, 13) through edge points, as `circles_through`."""
+    shapes = np.zeros((len(rows[1]) - 1, SHAPE))
+    run_slices(_fit_shapes, len(shapes), shapes, *rows, position, False, size=64)
     return shapes
 
 

@@ -15,6 +15,7 @@ from edgel.curves._points import EdgePoints
 from edgel.curves._rows import take_rows
 from edgel.curves._smooth import Smoothed, smooth
 from edgel.curves._split import Pieces, split
+from edgel.curves._straight import straighten
 
 _NOISY = 0.15  # spacings, of points about faces
 
@@ -60,8 +61,13 @@ def find_shapes(points: EdgePoints) -> Shapes:
     second = measure(points.index, first.shape[alive], owned, points, smoothed.position, spacing)
     second = grow(second, owned, points, smoothed.position, spacing)
     kept, owned, owner = _claimed(second, owned, spacing, smoothed, points)
-    runs, closed = _left(chains, pieces, paths, owner >= 0, points)
-    return Shapes(second.take(kept), spacing[kept], owned, runs, closed, smoothed)
+    second, spacing = second.take(kept), spacing[kept]
+    runs, _ = _left(chains, owner >= 0)
+    rough, apart, theirs = straighten(runs, points, smoothed, owner)
+    owner[theirs[0]] = len(second.holds)
+    runs, closed = _left(chains, owner >= 0)
+    every = np.concatenate([owned[0], theirs[0]]), np.concatenate([owned[1], owned[1][-1] + theirs[1][1:]])
+    return Shapes(second.and_(rough), np.concatenate([spacing, apart]), every, runs, closed, smoothed)
 
 
 def _claimed(
@@ -131,9 +137,7 @@ def _rows_of(owner: np.ndarray, alive: np.ndarray, count: int) -> tuple[np.ndarr
     return take_rows((order, start), alive)
 
 
-def _left(
-    chains: Chains, pieces: Pieces, paths: tuple[np.ndarray, np.ndarray], taken: np.ndarray, points: EdgePoints
-) -> tuple[list[np.ndarray], list[bool]]:
+def _left(chains: Chains, taken: np.ndarray) -> tuple[list[np.ndarray], list[bool]]:
     """Return the runs of edge points along chains that no shape has taken, gaps of three and fewer bridged."""
     runs, closed = [], []
     for chain in range(len(chains)):

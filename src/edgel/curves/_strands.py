@@ -15,13 +15,12 @@ from edgel.curves._gather import on_shapes
 from edgel.curves._points import EdgePoints
 from edgel.curves._rows import take_rows
 from edgel.curves._shapes import Shapes
+from edgel.curves._straight import are_strong, rows_of_runs
 
 _EVIDENCE, _STRENGTH = 0.33, 0.3
 """Strength of its edge points, added up, a spacing of a shape; and their mean, at least."""
 _CLEAR_EVIDENCE, _CLEAR_TURN, _CLEAR = 0.15, 0.6, 25.0
 """Less will do where the faces turn by so many radians, and that many standard deviations."""
-_RUN_STRENGTH, _RUN_STRONGEST = 0.38, 0.5
-"""Mean and largest strength of runs, which no face confirms."""
 _RUN_POINTS = 4
 _SURE = 0.02  # spacings: no face is surer
 
@@ -84,12 +83,11 @@ def find_strands(shapes: Shapes, points: EdgePoints) -> Strands:
     kept = _evident(measured.fit, shapes.rows, points.strength, np.maximum(length, 1.0))[on]
     on, ends, closed = on[kept], found.ends[kept], found.closed[kept]
     rows, start = _rows_within(shapes, position, on, ends, closed)
+    strong = are_strong(rows_of_runs(shapes.runs), points.strength).tolist()
     runs = [
         (run, is_closed)
-        for run, is_closed in zip(shapes.runs, shapes.run_closed, strict=True)
-        if len(run) >= _RUN_POINTS
-        and points.strength[run].mean() > _RUN_STRENGTH
-        and points.strength[run].max() >= _RUN_STRONGEST
+        for run, is_closed, is_strong in zip(shapes.runs, shapes.run_closed, strong, strict=True)
+        if len(run) >= _RUN_POINTS and is_strong
     ]
     number = len(runs)
     none = np.full((number, _fit.FIT), np.nan)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from edgel.cloud import Cloud
-from edgel.io.cells import in_cells
+from edgel.io.cells import grid_of, in_cells
 from edgel.io.e57_check import check_xml
 from edgel.io.e57_write import CARTESIAN, GRID, NAMES, PREFIX, SPHERICAL, library
 from edgel.io.errors import FormatError
@@ -20,7 +20,6 @@ from edgel.io.limits import check_unpacked
 
 # The smallest of these that holds a field's bounds is its type.
 _INTEGERS = [np.dtype(code) for code in ("u1", "i1", "u2", "i2", "u4", "i4", "i8")]
-_EMPTIEST = 20  # cells for each point: indices that leave more of a grid empty are some other numbers
 
 
 @dataclass(frozen=True)
@@ -43,7 +42,8 @@ def read(path: str | os.PathLike[str]) -> Cloud:
     Cloud
         Cartesian or spherical coordinates as x, y, z in the file's frame (metres). Numeric fields become attributes by
         their names (``colorRed`` as ``red`` and so on; those of an extension keep its prefix); a field that only some
-        scans have is NaN or 0 in the others. ``scan_index`` tells the scan when there are several. Of one scan the
+        scans have is NaN or 0 in the others. ``scan_index`` tells the scan when there are several, and
+        ``metadata["scan_positions"]`` where each scanner stood, None where the file does not say. Of one scan the
         scanner's position is the viewpoint, if it has a pose or spherical coordinates, and rowIndex and columnIndex
         make the cloud organized, unless they name a cell twice or leave more than 20 empty for each point: cells that
         are not in the file are NaN (attributes that have no NaN: 0). Points the scanner marked invalid are NaN in an
@@ -214,7 +214,7 @@ def _merge(scans: list[_Scan]) -> Cloud:
     if not scans:
         return Cloud(np.empty((0, 3)))
     num_invalid = sum(int(scan.invalid.sum()) for scan in scans)
-    metadata = {"e57_num_invalid": num_invalid, "e57_num_scans": len(scans)}
+    metadata: dict[str, Any] = {"e57_num_invalid": num_invalid, "e57_num_scans": len(scans)}
     if len(scans) == 1 and (cells := _cells(scans[0])) is not None:
         scan, (index, shape) = scans[0], cells
         xyz = np.where(scan.invalid[:, None], np.nan, scan.xyz)
@@ -225,6 +225,8 @@ def _merge(scans: list[_Scan]) -> Cloud:
     if len(scans) > 1:
         indices = [np.full(int((~scan.invalid).sum()), i, np.int32) for i, scan in enumerate(scans)]
         attributes["scan_index"] = np.concatenate(indices)
+        positions = (None if scan.position is None else tuple(scan.position.tolist()) for scan in scans)
+        metadata["scan_positions"] = tuple(positions)
     xyz = np.concatenate([scan.xyz[~scan.invalid] for scan in scans])
     return Cloud(xyz, attributes, None, scans[0].position if len(scans) == 1 else None, None, metadata)
 
@@ -240,11 +242,4 @@ def _cells(scan: _Scan) -> tuple[np.ndarray, tuple[int, int]] | None:
     """Return the point of each cell (-1: none), row by row, and the shape of a scan whose indices form a grid."""
     if any(name not in scan.attributes or not len(scan.xyz) for name in GRID):
         return None
-    row, col = (scan.attributes[name].astype(np.int64) for name in GRID)
-    low = int(row.min()), int(col.min())
-    shape = int(row.max()) - low[0] + 1, int(col.max()) - low[1] + 1
-    if min(shape) < 2 or shape[0] * shape[1] > _EMPTIEST * len(row):
-        return None
-    index = np.full(shape[0] * shape[1], -1)
-    index[(row - low[0]) * shape[1] + (col - low[1])] = np.arange(len(row))
-    return (index, shape) if np.count_nonzero(index >= 0) == len(row) else None
+    return grid_of(*(scan.attributes[name].astype(np.int64) for name in GRID))

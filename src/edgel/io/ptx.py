@@ -40,8 +40,8 @@ def read(path: str | os.PathLike[str]) -> Cloud:
         x, y, z in the frame of the registered scans, in the order of the file; 0 0 0, which stands for no return, is
         NaN. ``intensity`` is float64, ``red green blue`` are uint8. One scan is organized, with the scanner's columns,
         one after the other in the file, as rows of the cloud, and the scanner's position as viewpoint. With several
-        ``scan_index`` tells the scan, and ``metadata["scan_shapes"]`` the shape of each, into which its points can be
-        brought again.
+        ``scan_index`` tells the scan, ``metadata["scan_shapes"]`` the shape of each, into which its points can be
+        brought again, and ``metadata["scan_positions"]`` where its scanner stood.
 
     Raises
     ------
@@ -73,7 +73,9 @@ def read(path: str | os.PathLike[str]) -> Cloud:
         return Cloud(scans[0].xyz, attributes, scans[0].shape, scans[0].position)
     attributes["scan_index"] = np.repeat(np.arange(len(scans), dtype=np.int32), [len(scan.xyz) for scan in scans])
     shapes = tuple(scan.shape for scan in scans)
-    return Cloud(np.concatenate([scan.xyz for scan in scans]), attributes, metadata={"scan_shapes": shapes})
+    positions = tuple(tuple(scan.position.tolist()) for scan in scans)
+    metadata = {"scan_shapes": shapes, "scan_positions": positions}
+    return Cloud(np.concatenate([scan.xyz for scan in scans]), attributes, metadata=metadata)
 
 
 def _are_bytes(values: np.ndarray) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,11 +11,12 @@ from edgel._detect import detect
 from edgel._neighbors.estimate import estimate_normals
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import knn
-from edgel._neighbors.normals import UNKNOWN
-from edgel._neighbors.orientation import who_knows
+from edgel._neighbors.normals import SENSOR, UNKNOWN
+from edgel._neighbors.orientation import outward_normals, who_knows
 from edgel._neighbors.thinning import thin_to
+from edgel._objects import NORMALS
 from edgel._range_image import without_no_return
-from edgel.cloud import as_cloud, check_points
+from edgel.cloud import Cloud, as_cloud, check_points
 from edgel.edges import EdgeKind, Edges
 from edgel.matching._half_edges import HalfEdges, of_edges
 from edgel.matching._sight import Sight, build_sight, no_sight
@@ -73,9 +74,13 @@ def prepare(points: Any, edges: Edges | None, name: str) -> Prepared:
         If the edges, of the cloud of this name, are of another one, or nobody knows their sides.
     """
     cloud = as_cloud(points)
-    orient = "outward" if who_knows("auto", cloud, sensor=cloud.viewpoint is not None)[0] == UNKNOWN else "auto"
+    given = cloud
+    if nobody_knows := who_knows("auto", cloud, sensor=cloud.viewpoint is not None)[0] == UNKNOWN:
+        cloud = _turned_outwards(cloud)
     if edges is None:
-        edges = detect(cloud, orient=orient)
+        edges = detect(cloud)
+        if nobody_knows and edges.orientation == SENSOR:  # a detector's own view is not the outside
+            edges = detect(given, orient="outward")
     _check_edges(edges, len(cloud), name)
     finite, _ = without_no_return(cloud, check_points(cloud), cloud.viewpoint)
     order = np.lexsort(finite.xyz.T[::-1])  # whatever is chosen below must not depend on the order of the input
@@ -87,7 +92,7 @@ def prepare(points: Any, edges: Edges | None, name: str) -> Prepared:
     size = float(np.linalg.norm(np.diff(np.quantile(xyz, (0.02, 0.98), axis=0), axis=0)))
     thinned = thin_to(xyz, MOST_SURFACE, spacing)
     rows = finite.rows[order][thinned]
-    planes = estimate_normals(cloud, at=rows, num_neighbors=_PLANE, orient=orient)
+    planes = estimate_normals(cloud, at=rows, num_neighbors=_PLANE)
     kept = np.isfinite(planes.offset)
     normals, places = planes.normals[kept], xyz[thinned][kept]
     places = places - ((places * normals).sum(axis=1) - planes.offset[kept])[:, None] * normals
@@ -100,6 +105,17 @@ def prepare(points: Any, edges: Edges | None, name: str) -> Prepared:
     smooth = away[clear] >= _SMOOTH * spacing
     gap = spacing * float(np.sqrt(len(xyz) / len(thinned)))
     return Prepared(half, places[clear], normals[clear], smooth, gap, spacing, size, sight)
+
+
+def _turned_outwards(cloud: Cloud) -> Cloud:
+    """Give a cloud the normals of its whole surface, found once for all that asks for its sides."""
+    finite, _ = without_no_return(cloud, check_points(cloud), None)
+    normals = np.full((len(cloud), 3), np.nan)
+    normals[finite.rows] = outward_normals(build_index(finite.xyz))
+    others = {
+        name: column for name, column in cloud.attributes.items() if "_".join(name.split()).lower() not in NORMALS
+    }
+    return replace(cloud, attributes=others | dict(zip(NORMALS, normals.T, strict=True)))
 
 
 def shared_planes(side: Prepared) -> float:

@@ -21,6 +21,12 @@ class Box:
     low: tuple[float, ...]
     high: tuple[float, ...]
 
+    @staticmethod
+    def around(xyz: np.ndarray) -> Box:
+        """Return the smallest box that holds some points (N, 3), N > 0."""
+        low, high = xyz[:, :2].min(axis=0), np.nextafter(xyz[:, :2].max(axis=0), np.inf)
+        return Box(tuple(low.tolist()), tuple(high.tolist()))
+
     def touches(self, low: Any, high: Any) -> Any:
         """Whether something between two corners (..., 2), both its own, may have a point in the box."""
         return (np.asarray(high) >= self.low).all(axis=-1) & (np.asarray(low) < self.high).all(axis=-1)

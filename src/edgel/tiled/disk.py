@@ -13,6 +13,7 @@ from edgel.tiled.spool import BYTES_A_POINT
 
 _EXPANDS = 8  # bytes of points in the spool for one of a file that does not say how many it has, at most
 RESULTS = 76  # bytes a point of results, as measured on a city of which one point in ten is an edge's
+SMOOTHED = 115  # bytes a point that noise adds: where it is looked at, 56, means of cells, and results of these
 _LABELS = 0.6  # bytes of edge points, labelled and written, over what was kept to find them: measured, 0.5 to 0.6
 
 
@@ -52,6 +53,18 @@ def check_results(plan: Plan) -> None:
                 points += int(found["points"])
     if points:
         _check(plan.folder, int(size / points * ((1 + _LABELS) * plan.num_points - points)))
+
+
+def check_smoothed(plan: Plan) -> None:
+    """Compare what a cloud takes besides that has to be smoothed with the free space, unless that is done.
+
+    Raises
+    ------
+    OSError
+        If it is too little.
+    """
+    if not plan.smoothed.folder.exists():
+        _check(plan.folder, SMOOTHED * plan.num_points)
 
 
 def _check(work: Path, needed: int) -> None:

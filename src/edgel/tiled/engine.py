@@ -71,9 +71,16 @@ class Engine:
         # Names say nothing of the work: what is done is known by its files, and a scheduler forgets.
         futures = {self.client.submit(task, *job, pure=False): number for number, job in jobs.items()}
         for future in as_completed(list(futures)):
+            if future.cancelled():
+                break
             error = future.exception()
             yield futures.pop(future), error
             future.release()
+        if futures:
+            raise ConnectionError(
+                f"scheduler: that of the cluster is gone, {len(futures)} of {len(jobs)} tasks not known to be done; "
+                "start one and go on with the same call, with its address"
+            )
 
 
 def _here(task: Callable[..., Any], jobs: dict[int, tuple[Any, ...]]) -> Iterator[tuple[int, BaseException | None]]:

@@ -6,19 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from edgel._faces import Faces
 from edgel._labels import Labels
-from edgel._neighbors.kdtree import build_index
-from edgel._neighbors.knn import knn
 from edgel._neighbors.normals import UNKNOWN
-from edgel._surface.faces import LocalFits
-from edgel._surface.line import SURE as PLAIN
-from edgel._surface.line import Faint, strength_of, with_faint
-from edgel._surface.rims import COUNTS as RIM_COUNTS
-from edgel._surface.surface import SURE
+from edgel._surface.coarser import Carried
+from edgel._surface.line import Strengths
 from edgel.edges import EdgeKind
-from edgel.tiled.box import Box
-from edgel.tiled.chains import KINDS, Line
-from edgel.tiled.classify import FITS_KEPT, HALO
+from edgel.tiled.chains import Line
+from edgel.tiled.coarser import faces_of
+from edgel.tiled.found import fits_of, outermost_around, strengths_of_tile
 from edgel.tiled.measure import Whole
 from edgel.tiled.plan import Plan
 
@@ -30,50 +26,45 @@ def label_tile(plan: Plan, whole: Whole, line: Line, tile: int) -> None:
 
 def _label(plan: Plan, whole: Whole, line: Line, tile: int) -> dict[str, np.ndarray]:
     with plan.load("classify", tile) as found:
-        key, side, probabilities = found["key"], found["side"], [found[kind] for kind in KINDS]
-        fits = LocalFits(**{name: found[name] for name in FITS_KEPT}, seen=found["xyz"])
-    labels, options = Labels(len(key)), plan.options
-    crease, outline = (
-        _strengths(plan, tile, kind, probability, even)
-        for kind, probability, even in zip(KINDS, probabilities, line.even, strict=True)
-    )
-    everyone = np.arange(len(key))
-    labels.add(everyone, EdgeKind.CREASE, crease)
-    labels.add(everyone, side if line.sides else EdgeKind.BOUNDARY, outline)
-    kind = labels.of(EdgeKind(options.kinds), options.min_strength)
-    edge = np.flatnonzero(kind > 0)
-    fits = fits.take(edge)
-    viewpoint = None if options.viewpoint is None else np.array(options.viewpoint)
-    outermost = _outermost(plan, plan.tiles[tile], fits.xyz, HALO * whole.statistics.spacing / 4)
-    faces = fits.faces(kind[edge], outermost, viewpoint)
+        own, side, xyz = strengths_of_tile(plan, line, tile), found["side"], found["xyz"]
+    if not plan.result("carry", tile).exists():  # no coarser look was taken
+        key, kind, strength = _labelled(plan, line, own, side)
+        faces = _faces(plan, whole, tile, key, kind)
+    else:
+        with plan.load("carry", tile) as found:
+            carried = Carried(Strengths(found["key"], found["crease"], found["outline"]), found["source"])
+            both = np.concatenate([own.points, found["key"]])
+            side, xyz = np.concatenate([side, found["side"]]), np.concatenate([xyz, found["xyz"]])
+            tiles = found["tile"]
+        joined = own.join(carried.strengths)
+        at = np.unique(both, return_index=True)[1]
+        key, kind, strength = _labelled(plan, line, joined, side[at])
+        xyz = xyz[at][np.isin(joined.points, key)]
+        faces = Faces.of_points(xyz, np.full_like(xyz, np.nan))
+        known = np.isin(key, own.points)
+        faces.put(known, _faces(plan, whole, tile, key[known], kind[known]), slice(None))
+        rows, sources = carried.seen_at(key, own)
+        of_carried = np.searchsorted(carried.strengths.points, key[rows])
+        from_coarser, of_source = faces_of(plan, sources, tiles[of_carried])
+        faces.put(rows, from_coarser.along(xyz[rows], of_source), slice(None))
     if plan.orientation == UNKNOWN:
         faces = replace(faces, convex=np.zeros_like(faces.convex))
-    return {"key": key[edge], "kind": kind[edge], "strength": labels.strength[edge], **vars(faces)}
+    return {"key": key, "kind": kind, "strength": strength, **vars(faces)}
 
 
-def _strengths(plan: Plan, tile: int, kind: str, probability: np.ndarray, even: float) -> np.ndarray:
-    if even >= PLAIN:
-        return strength_of(probability, even)
-    with plan.load("link", tile) as found, plan.load(f"chained {kind}", tile) as chained:
-        rows = found[f"{kind}_row"]
-        faint = Faint(rows, np.zeros((len(rows), 0), np.int64), found[f"{kind}_likeliest"])
-        return with_faint(probability, even, faint, chained["kept"])
+def _labelled(plan: Plan, line: Line, found: Strengths, side: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Label points (M,), by what lies beside each (M,); returns keys, kinds and strengths of the edge points."""
+    labels, everyone = Labels(len(found.points)), np.arange(len(found.points))
+    labels.add(everyone, EdgeKind.CREASE, found.crease)
+    labels.add(everyone, side if line.sides else EdgeKind.BOUNDARY, found.outline)
+    kind = labels.of(EdgeKind(plan.options.kinds), plan.options.min_strength)
+    edge = np.flatnonzero(kind > 0)
+    return found.points[edge], kind[edge], labels.strength[edge]
 
 
-def _outermost(plan: Plan, core: Box, xyz: np.ndarray, halo: float) -> np.ndarray:
-    """Return the points (K, 3) that surely are where the surface ends, as far around as edge points (E, 3) ask for."""
-    while True:
-        box = core.grown(halo, halo).without_end(*plan.bounds)
-        found = [np.zeros((0, 3))]
-        for tile in plan.around(box):
-            with plan.load("classify", tile) as kept:
-                found.append(kept["xyz"][kept["outline"] > SURE])
-        outermost = np.concatenate(found)
-        if box.endless or not len(xyz):
-            return outermost
-        outermost = outermost[box.holds(outermost)]
-        if len(outermost) >= RIM_COUNTS[-1]:
-            away = knn(build_index(outermost), xyz, RIM_COUNTS[-1]).distances[:, -1]
-            if (away < box.depth(xyz)).all():
-                return outermost
-        halo *= 2
+def _faces(plan: Plan, whole: Whole, tile: int, key: np.ndarray, kind: np.ndarray) -> Faces:
+    """Say where edges run at some points (E,), ascending, that the tile keeps, by their own neighbours."""
+    with plan.load("classify", tile) as found:
+        fits = fits_of(plan, tile).take(np.searchsorted(found["key"], key))
+    viewpoint = None if plan.options.viewpoint is None else np.array(plan.options.viewpoint)
+    return fits.faces(kind, outermost_around(plan, whole, tile, fits.xyz), viewpoint)

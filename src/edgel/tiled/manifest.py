@@ -37,12 +37,13 @@ def check_manifest(folder: Path, files: Sequence[str], options: Options) -> list
         stored = {**wanted, "cpus": [cpu]}
     else:
         stored = json.loads(path.read_text())
-        for what in ("version", "options"):
-            if stored[what] != wanted[what]:
-                raise ValueError(
-                    f"{folder}: holds results of another {what} ({stored[what]}, now {wanted[what]}); overwrite them "
-                    "(--overwrite), or name another folder"
-                )
+        before, now = ({"version": of["version"], **of["options"]} for of in (stored, wanted))
+        unlike = [f"{key} {before.get(key)}, now {now.get(key)}" for key in now if before.get(key) != now[key]]
+        if unlike:
+            raise ValueError(
+                f"{folder}: holds results of other options ({'; '.join(unlike)}); overwrite them (--overwrite), or "
+                "name another folder"
+            )
         _compare_inputs(folder, stored["inputs"], wanted["inputs"])
         stored["cpus"] = sorted({*stored["cpus"], cpu})
     with made_aside(path) as beside:

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from edgel._faces import Faces
-from edgel._neighbors.normals import OUTWARD, OWN
+from edgel._neighbors.normals import OUTWARD, OWN, UNKNOWN
 from edgel.edges import Edges
 from edgel.io import write
 from edgel.io.chunks import read_rows
@@ -19,21 +18,22 @@ from edgel.io.files import COPC, stem
 from edgel.tiled.aside import made_aside
 from edgel.tiled.box import Box
 from edgel.tiled.plan import Plan
+from edgel.tiled.scans import load_scans, no_edges
 from edgel.tiled.spool import ROWS, Part
-
-_FIELDS = ("kind", "strength", *Faces.__dataclass_fields__)
 
 
 def edges_of(plan: Plan, part: Part) -> Edges:
     """Gather the edge points of one file from the tiles that it reaches into."""
+    if part.num_scans:
+        return _edges_of_scans(plan, part)
     low, high = (np.array(corner[:2]) for corner in (part.low, part.high))
     box = Box(tuple(low.tolist()), tuple(np.nextafter(high, np.inf).tolist()))
-    keys, columns = [], {name: [] for name in _FIELDS}
-    for tile in plan.around(box) if part.num_points else range(1):
+    keys, columns = [np.zeros(0, np.int64)], {name: [none] for name, none in no_edges().items()}
+    for tile in plan.around(box) if part.num_points else []:
         with plan.load("label", tile) as found:
             mine = found["key"] >> ROWS == part.number
             keys.append(found["key"][mine])
-            for name in _FIELDS:
+            for name in columns:
                 columns[name].append(found[name][mine])
         if plan.orientation in (OUTWARD, OWN):  # then faces were turned once all were known
             with plan.load("turn", tile) as turned:
@@ -54,6 +54,25 @@ def edges_of(plan: Plan, part: Part) -> Edges:
     )
 
 
+def _edges_of_scans(plan: Plan, part: Part) -> Edges:
+    """Put the edge points of all scans of a file together."""
+    found = load_scans(plan, part)
+    row = np.concatenate([each["row"] for each in found])
+    order = np.argsort(row)
+    said = {str(each["orientation"]) for each in found} - {""}
+    return Edges(
+        index=row[order],
+        **{name: np.concatenate([each[name] for each in found])[order] for name in no_edges()},
+        orientation=said.pop() if len(said) == 1 else UNKNOWN,
+        num_points=part.num_rows,
+        num_dropped=part.num_rows - sum(int(each["points"]) for each in found),
+        method="scans",
+        reason="each scan from its own sensor",
+        parameters={"min_strength": plan.options.min_strength, "num_neighbors": plan.options.num_neighbors},
+        seconds={},
+    )
+
+
 def write_part(folder: Path, number: int, target: str) -> None:
     """Write the edge points of one file with all their attributes, unless that is done."""
     plan = Plan.read(folder)
@@ -62,7 +81,7 @@ def write_part(folder: Path, number: int, target: str) -> None:
     if done.exists() and Path(target).exists():
         return
     edges = edges_of(plan, part)
-    if part.num_points:
+    if part.num_points or part.num_scans:
         rows = read_rows(part.path, edges.index)
         write(target, replace(edges, index=np.arange(len(edges))).to_cloud(rows))
     with made_aside(done) as beside:

@@ -33,7 +33,7 @@ def _agree(plan: Plan, whole: Whole, tile: int) -> dict[str, np.ndarray]:
     size, halo, core = cell_size(whole.cloud_spacing), HALO * whole.cloud_spacing, plan.tiles[tile]
     while (window := open_window(plan, whole, core, halo)) is not None:
         found = agreement(window.index, window.stretch, whole.cloud_spacing)
-        asked = _cells_of_pairs(found, window.core, size)
+        asked = _cells_of_pairs(found, window.owned, size)
         if window.endless or (_reach(window)[asked] < window.depth[asked]).all():
             return _joined(window, found, size)
         halo *= 2
@@ -69,7 +69,7 @@ def _reach(window: Window) -> np.ndarray:
 def _joined(window: Window, found: Agreement, size: float) -> dict[str, np.ndarray]:
     index = window.index
     order = np.lexsort(found.xyz.T[::-1])
-    found, key, own = found.ordered(order), window.keys[index.order[order]], window.core[order]
+    found, key, own = found.ordered(order), window.keys[index.order[order]], window.owned[order]
     sign, root = join(within_cells(found.pairs, found.xyz, size), len(order), SURELY)
     pairs = found.pairs.take(own[found.pairs.a]).renamed(root, sign)
     roots = np.unique(np.concatenate([root[own], pairs.a, pairs.b]))

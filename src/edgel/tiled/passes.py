@@ -2,19 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from edgel._neighbors.normals import OUTWARD, OWN
+from edgel._surface.coarser import FEWEST
 from edgel.tiled.chains import Line, draw_line, link_tile, merge_chains
 from edgel.tiled.classify import classify_tile
-from edgel.tiled.disk import check_results
+from edgel.tiled.coarser import (
+    carry_tile,
+    cell_of,
+    check_cells,
+    farthest_outside,
+    find_tile,
+    mark_tile,
+    mean_tile,
+    plan_coarser,
+)
+from edgel.tiled.disk import check_results, check_smoothed
 from edgel.tiled.engine import Engine
 from edgel.tiled.label import label_tile
-from edgel.tiled.measure import Whole, lies_on_lines, measure, measure_on_lines, merge_measures
+from edgel.tiled.measure import (
+    Whole,
+    lies_on_lines,
+    measure,
+    measure_on_lines,
+    measure_smoothed,
+    merge_measures,
+    smoothing_of,
+)
 from edgel.tiled.outward import agree_in_tile, face_outwards, find_outermost, join_pieces, turn_tile
 from edgel.tiled.plan import Plan
+from edgel.tiled.scans import see_scans
+from edgel.tiled.smooth import smooth_tile
 
 
 class TileError(OSError):
@@ -29,68 +51,80 @@ def find_edges(engine: Engine, plan: Plan) -> None:
     TileError
         If some tiles failed twice.
     """
-    tiles = range(len(plan.tiles))
+    whole, line = _classified(engine, plan)
+    if whole.smoothed:
+        _look_coarser(engine, plan, whole, line)
+    _run(engine, "placing", label_tile, plan, whole, line)
+    _turned(engine, plan, whole)
+
+
+def see_all(engine: Engine, plan: Plan, paths: Sequence[str]) -> None:
+    """Find the edges of organized scans among the inputs, each seen from its own sensor."""
+    numbers = [part.number for part in plan.spool.parts if part.num_scans]
+    failed = engine.run("seeing scans", _do, [(see_scans, plan.folder, number) for number in numbers])
+    raise_for(failed, "file", [paths[number] for number in numbers])
+
+
+def _run(
+    engine: Engine,
+    what: str,
+    task: Callable[..., None],
+    plan: Plan,
+    *arguments: Any,
+    check: Callable[[], None] | None = None,
+) -> None:
+    """Run ``task(plan, *arguments, tile)`` for all tiles."""
+    jobs = [(task, plan.folder, *arguments, tile) for tile in range(len(plan.tiles))]
     names = [f"x {t.low[0]:g} to {t.high[0]:g}, y {t.low[1]:g} to {t.high[1]:g}" for t in plan.tiles]
-    raise_for(engine.run("measuring", _measure, [(plan.folder, tile) for tile in tiles]), "tile", names)
-    if lies_on_lines(plan):
-        jobs = [(plan.folder, tile) for tile in tiles]
-        raise_for(engine.run("measuring on lines", _measure_on_lines, jobs), "tile", names)
+    raise_for(engine.run(f"{what}, coarser" if plan.cell else what, _do, jobs, check), "tile", names)
+
+
+def _do(task: Callable[..., None], folder: Path, *arguments: Any) -> None:
+    task(Plan.read(folder), *arguments)
+
+
+def _classified(engine: Engine, plan: Plan) -> tuple[Whole, Line]:
+    """Classify all points where they are looked at, and draw the line."""
+    _run(engine, "measuring", measure, plan)
+    share, spacing = smoothing_of(plan)
+    if share > 0:
+        check_smoothed(plan)
+        _run(engine, "smoothing", smooth_tile, plan, share, spacing)
+        _run(engine, "measuring smoothed", measure_smoothed, plan)
+    if lies_on_lines(plan, smoothed=share > 0):
+        _run(engine, "measuring on lines", measure_on_lines, plan, share > 0)
     whole = merge_measures(plan)
-    jobs = [(plan.folder, whole, tile) for tile in tiles]
-    check_after = partial(check_results, plan)  # as soon as some tiles tell what a point takes
-    raise_for(engine.run("classifying", _classify, jobs, check_after), "tile", names)
+    # As soon as some tiles tell what a point takes, room for the others is compared.
+    _run(engine, "classifying", classify_tile, plan, whole, check=partial(check_results, plan))
     line = draw_line(plan, whole)
     if not line.is_plain:
-        raise_for(engine.run("linking", _link, [(plan.folder, line, tile) for tile in tiles]), "tile", names)
+        _run(engine, "linking", link_tile, plan, line)
         merge_chains(plan)
-    raise_for(engine.run("placing", _label, [(plan.folder, whole, line, tile) for tile in tiles]), "tile", names)
-    _turned(engine, plan, whole, names)
+    return whole, line
 
 
-def _turned(engine: Engine, plan: Plan, whole: Whole, names: Sequence[str]) -> None:
+def _look_coarser(engine: Engine, plan: Plan, whole: Whole, line: Line) -> None:
+    """Look at the means of cells, and carry what they alone show back to the points."""
+    check_cells(plan, cell_of(whole))
+    _run(engine, "averaging", mean_tile, plan, whole)
+    if plan.means.counts.sum() < FEWEST:
+        return
+    for coarser in plan_coarser(plan, whole):
+        seen, drawn = _classified(engine, coarser)
+        _run(engine, "placing", find_tile, coarser, seen, drawn)
+    _run(engine, "marking", mark_tile, plan, whole)
+    _run(engine, "carrying", carry_tile, plan, whole, line, farthest_outside(plan))
+
+
+def _turned(engine: Engine, plan: Plan, whole: Whole) -> None:
     """Turn the faces of all edges to the outside, where the cloud's or a whole surface's normals tell it."""
-    tiles = range(len(plan.tiles))
-    each = [(plan.folder, tile) for tile in tiles]
-    with_whole = [(plan.folder, whole, tile) for tile in tiles]
     if plan.orientation == OUTWARD:
-        raise_for(engine.run("agreeing", _agree, with_whole), "tile", names)
+        _run(engine, "agreeing", agree_in_tile, plan, whole)
         join_pieces(plan)
-        raise_for(engine.run("facing outwards", _outermost, each), "tile", names)
+        _run(engine, "facing outwards", find_outermost, plan)
         face_outwards(plan)
     if plan.orientation in (OUTWARD, OWN):
-        raise_for(engine.run("turning", _turn, with_whole), "tile", names)
-
-
-def _agree(folder: Path, whole: Whole, tile: int) -> None:
-    agree_in_tile(Plan.read(folder), whole, tile)
-
-
-def _outermost(folder: Path, tile: int) -> None:
-    find_outermost(Plan.read(folder), tile)
-
-
-def _turn(folder: Path, whole: Whole, tile: int) -> None:
-    turn_tile(Plan.read(folder), whole, tile)
-
-
-def _measure(folder: Path, tile: int) -> None:
-    measure(Plan.read(folder), tile)
-
-
-def _measure_on_lines(folder: Path, tile: int) -> None:
-    measure_on_lines(Plan.read(folder), tile)
-
-
-def _classify(folder: Path, whole: Whole, tile: int) -> None:
-    classify_tile(Plan.read(folder), whole, tile)
-
-
-def _link(folder: Path, line: Line, tile: int) -> None:
-    link_tile(Plan.read(folder), line, tile)
-
-
-def _label(folder: Path, whole: Whole, line: Line, tile: int) -> None:
-    label_tile(Plan.read(folder), whole, line, tile)
+        _run(engine, "turning", turn_tile, plan, whole)
 
 
 def raise_for(failed: dict[int, BaseException], what: str, names: Sequence[str]) -> None:

@@ -15,6 +15,7 @@ from edgel._neighbors.normals import OUTWARD, OWN, SENSOR, UNKNOWN
 from edgel.tiled.aside import made_aside
 from edgel.tiled.box import Box
 from edgel.tiled.spool import Part, Spool, load_part
+from edgel.tiled.store import Store, Stored
 
 _NO_RETURN = (1e-3, 10)  # share of the points, and number, that lie at 0 0 0 where that stands for no return
 
@@ -44,22 +45,56 @@ class Plan:
         The cores: each point lies in one of them.
     num_parts : int
         Files in the spool.
+    cell : float
+        Of a plan for the coarser look: side of the cells whose means are its points; 0 where they are those of files.
     """
 
     folder: Path
     options: Options
     tiles: Sequence[Box]
     num_parts: int
+    cell: float = 0.0
 
     @cached_property
     def spool(self) -> Spool:
-        """The points."""
+        """The points of the files."""
         parts = [load_part(self.folder / "spool" / f"{number:06d}") for number in range(self.num_parts)]
         return Spool(self.folder / "spool", parts, origin_left_out(parts))
 
     @cached_property
+    def means(self) -> Store:
+        """The means of cells, which are the points of a plan for the coarser look, and lie beside it."""
+        return Store((self.folder.parent if self.cell else self.folder) / "means", len(self.tiles), moved=False)
+
+    @cached_property
+    def smoothed(self) -> Store:
+        """The points where noise has them looked at."""
+        return Store(self.folder / "smoothed", len(self.tiles), moved=True)
+
+    @cached_property
+    def points(self) -> Spool | Store:
+        """The points."""
+        return self.means if self.cell else self.spool
+
+    def seen(self, box: Box, *, smoothed: bool) -> Stored:
+        """Return the points that lie in a box or are looked at there; the latter is where they lie unless smoothed."""
+        if smoothed:
+            return self.smoothed.stored(box)
+        xyz, keys = self.points.load(box)
+        return Stored(keys, xyz, xyz)
+
+    def seen_bounds(self, *, smoothed: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Corners (2,) in plan of all points, and of where they are looked at."""
+        if not smoothed:
+            return self.bounds
+        low, high = self.smoothed.corners
+        return low[:2], high[:2]
+
+    @cached_property
     def num_points(self) -> int:
         """Finite points, without those that stand for no return."""
+        if self.cell:
+            return int(self.means.counts.sum())
         spool = self.spool
         return sum(part.num_points - (part.at_origin if spool.without_origin else 0) for part in spool.parts)
 
@@ -73,6 +108,9 @@ class Plan:
     @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Corners (2,) in plan of all points."""
+        if self.cell:
+            low, high = self.means.corners
+            return low[:2], high[:2]
         return bounds_of(self.spool.parts)
 
     @cached_property
@@ -80,10 +118,6 @@ class Plan:
         """How far apart points would lie in plan if they lay evenly: where a halo begins to be tried."""
         low, high = self.bounds
         return float(np.sqrt(max(np.prod(high - low), 1e-300) / self.num_points)) or 1.0
-
-    def window(self, tile: int, halo: float, step: float) -> Box:
-        """Return the core of a tile with a halo, aligned to a step; infinite where there are no points beyond."""
-        return self.tiles[tile].grown(halo, step).without_end(*self.bounds)
 
     def result(self, step: str, tile: int) -> Path:
         """Return where the result of a step at a tile lies."""
@@ -118,8 +152,10 @@ class Plan:
                 "options": asdict(self.options),
                 "tiles": [[*tile.low, *tile.high] for tile in self.tiles],
                 "num_parts": self.num_parts,
+                "cell": self.cell,
             }
         )
+        self.folder.mkdir(exist_ok=True)
         with made_aside(self.folder / "plan.json") as beside:
             beside.write_text(text)
 
@@ -130,7 +166,7 @@ class Plan:
         viewpoint = stored["options"]["viewpoint"]
         options = Options(**{**stored["options"], "viewpoint": None if viewpoint is None else tuple(viewpoint)})
         tiles = [Box((a, b), (c, d)) for a, b, c, d in stored["tiles"]]
-        return Plan(folder, options, tiles, stored["num_parts"])
+        return Plan(folder, options, tiles, stored["num_parts"], stored["cell"])
 
 
 def origin_left_out(parts: Sequence[Part]) -> bool:

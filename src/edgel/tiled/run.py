@@ -15,14 +15,16 @@ from edgel._neighbors.normals import OUTWARD
 from edgel._neighbors.orientation import check_orient
 from edgel.cloud import as_vector
 from edgel.edges import EdgeKind, Edges, as_kinds
+from edgel.io import WRITERS
 from edgel.io.files import stem
 from edgel.tiled.aside import clear_stale
 from edgel.tiled.disk import check_before
 from edgel.tiled.engine import Engine, start
 from edgel.tiled.manifest import FILE, check_manifest
 from edgel.tiled.output import edges_of, write_index, write_part
-from edgel.tiled.passes import TileError, find_edges, raise_for
+from edgel.tiled.passes import TileError, find_edges, raise_for, see_all
 from edgel.tiled.plan import Options, Plan, cut, origin_left_out
+from edgel.tiled.scans import load_scans
 from edgel.tiled.spool import Part, Spool, spool
 
 TILE_POINTS = 3_000_000
@@ -38,6 +40,7 @@ class Tiled:
     outputs : sequence of str
         The file of each input's edge points, in the order of the inputs.
     num_points, num_edges, num_tiles : int
+        Those of organized scans, which are in no tile, are among the points and edges.
     points_read : int
         Points read of the spool for classification, halos included.
     notices : sequence of str
@@ -77,7 +80,8 @@ def detect(
     """Find the edge points of a cloud that lies in several files, tile by tile.
 
     The answer is that of ``edgel.detect(points, method="surface")`` for all points together, to the bit on one kind of
-    CPU, whatever the tiles. The same call again goes on where it stopped.
+    CPU, whatever the tiles. The same call again goes on where it stopped. Organized scans among the files, several of a
+    PTX or E57 too, are no points of that cloud: each is seen from its own sensor, as by ``edgel.detect(scan)``.
 
     Parameters
     ----------
@@ -92,7 +96,7 @@ def detect(
     scheduler : str, optional
         Address of a Dask cluster whose workers see the same folder, such as ``"tcp://10.0.0.1:8786"``.
     extension : str, optional
-        Of the files written, ``".laz"``; by default that of each input.
+        Of the files written, ``".laz"``; by default that of each input, ``".ply"`` where that is only read.
     overwrite : bool
         Whether results of other files or options in the folder are removed first.
     kinds, min_strength, num_neighbors, viewpoint, orient
@@ -107,8 +111,8 @@ def detect(
     Raises
     ------
     FileNotFoundError, FormatError, ValueError
-        If a file cannot be read, lies in another frame (CRS) than the first, or is a view of its own; if the cloud is
-        one that tiles cannot answer (much noise, color edges, normals in some files alone and no viewpoint); if the
+        If a file cannot be read, or lies in another frame (CRS) than the first; if the cloud is one that tiles cannot
+        answer (shown best from a side, color edges, normals in some files alone and no viewpoint); if the
         folder holds results of something else; if the disk is too small. The message names the file and the remedy.
     TileError
         If a tile failed twice; the others are done, and the same call does what is missing.
@@ -142,12 +146,14 @@ def detect(
     check_before(paths, work)
     with start(workers, scheduler, say) as engine:
         plan = _prepare(engine, paths, work, options)
-        find_edges(engine, plan)
+        if plan.tiles:
+            find_edges(engine, plan)
+        see_all(engine, plan, paths)
         jobs = [(work, number, output) for number, output in enumerate(outputs)]
         raise_for(engine.run("writing", write_part, jobs), "file", paths)
     write_index(folder / "edges.vpc", plan, outputs)
-    edges, read = _count(plan)
-    return Tiled(folder, outputs, plan.num_points, edges, len(plan.tiles), read, notices)
+    points, edges, read = _count(plan)
+    return Tiled(folder, outputs, points, edges, len(plan.tiles), read, notices + _of_scans(plan))
 
 
 def _options(
@@ -169,11 +175,12 @@ def _options(
 
 def _outputs(paths: Sequence[str], folder: Path, extension: str | None) -> list[str]:
     """Name the output of each file by its own name; of files of one name by their numbers too."""
-    stems = [stem(path) for path in paths]
-    return [
-        str(folder / f"{own if stems.count(own) == 1 else f'{own}_{number}'}{extension or Path(path).name[len(own) :]}")
-        for number, (path, own) in enumerate(zip(paths, stems, strict=True))
-    ]
+    stems, outputs = [stem(path) for path in paths], []
+    for number, (path, own) in enumerate(zip(paths, stems, strict=True)):
+        ending = extension or Path(path).name[len(own) :]
+        ending = ending if Path(f"a{ending}").suffix.lower() in WRITERS else ".ply"  # what is read and never written
+        outputs.append(str(folder / f"{own if stems.count(own) == 1 else f'{own}_{number}'}{ending}"))
+    return outputs
 
 
 def _prepare(engine: Engine, paths: Sequence[str], work: Path, options: Options) -> Plan:
@@ -191,7 +198,8 @@ def _prepare(engine: Engine, paths: Sequence[str], work: Path, options: Options)
         ) from error
     parts = [spool(path, number, work / "spool") for number, path in enumerate(paths)]
     _check_parts(parts, options)
-    tiles = cut(Spool(work / "spool", parts, origin_left_out(parts)), options.tile_points)
+    some = any(part.num_points for part in parts)
+    tiles = cut(Spool(work / "spool", parts, origin_left_out(parts)), options.tile_points) if some else []
     plan = Plan(work, options, tiles, len(parts))
     plan.save()
     return plan
@@ -199,7 +207,7 @@ def _prepare(engine: Engine, paths: Sequence[str], work: Path, options: Options)
 
 def _check_parts(parts: Sequence[Part], options: Options) -> None:
     some = [part for part in parts if part.num_points]
-    if sum(part.num_points for part in some) < 3:
+    if sum(part.num_points for part in some) < 3 and (some or not any(part.num_scans for part in parts)):
         raise ValueError("files: needs at least 3 points with finite coordinates in all of them")
     for part in some:
         if part.crs != some[0].crs:
@@ -215,11 +223,22 @@ def _check_parts(parts: Sequence[Part], options: Options) -> None:
             )
 
 
-def _count(plan: Plan) -> tuple[int, int]:
-    edges = read = 0
+def _of_scans(plan: Plan) -> list[str]:
+    return [
+        f"{part.path}: {part.num_scans} organized scan{'s' * (part.num_scans > 1)}, each seen from its own sensor"
+        for part in plan.spool.parts
+        if part.num_scans
+    ]
+
+
+def _count(plan: Plan) -> tuple[int, int, int]:
+    points, edges, read = plan.num_points, 0, 0
     for tile in range(len(plan.tiles)):
         with plan.load("label", tile) as found:
             edges += len(found["key"])
         with plan.load("classify", tile) as found:
             read += int(found["read"])
-    return edges, read
+    for part in plan.spool.parts:
+        for found in load_scans(plan, part):
+            points, edges = points + int(found["points"]), edges + len(found["row"])
+    return points, edges, read

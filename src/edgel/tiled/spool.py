@@ -18,6 +18,7 @@ import numpy as np
 from edgel._neighbors.orientation import has_normals, own_normals
 from edgel.cloud import check_points
 from edgel.io.chunks import read_chunks
+from edgel.io.scans import organized_scans
 from edgel.tiled.aside import made_aside
 from edgel.tiled.box import Box
 
@@ -46,6 +47,8 @@ class Part:
         Of the blocks, a power of two.
     normals : bool
         Whether the file has normals of its own, any of which is not 0.
+    num_scans : int
+        Organized scans: such a file has no points in the spool, since each scan is seen from its own sensor.
     """
 
     number: int
@@ -59,6 +62,7 @@ class Part:
     crs: str | None
     side: float
     normals: bool
+    num_scans: int
 
 
 def spool(path: str, number: int, folder: Path) -> Part:
@@ -79,7 +83,7 @@ def load_part(place: Path) -> Part:
 
 def _sort(path: str, number: int, place: Path) -> Part:
     """Sort each stretch of rows by blocks, one after the other: none but one has to fit into memory."""
-    rows = points = at_origin = 0
+    rows = points = at_origin = num_scans = 0
     low, high, side, crs, normals = np.full(3, np.inf), np.full(3, -np.inf), 0.0, None, False
     blocks, starts = [np.zeros((0, 2))], [np.zeros(0, np.int64)]
     with (
@@ -88,11 +92,9 @@ def _sort(path: str, number: int, place: Path) -> Part:
         open(place / _NORMALS, "wb") as directions,
     ):
         for cloud in read_chunks(path):
-            if cloud.is_organized:
-                raise ValueError(
-                    f"{path}: an organized cloud, seen from a sensor, is no part of a larger one; run it by itself, "
-                    "without as-one"
-                )
+            if num_scans := len(organized_scans(cloud)):
+                rows = len(cloud)
+                break
             checked = check_points(cloud, minimum=0)
             xyz = checked.xyz
             crs, own = cloud.crs, own_normals(cloud)
@@ -127,6 +129,7 @@ def _sort(path: str, number: int, place: Path) -> Part:
         crs=crs,
         side=side,
         normals=normals,
+        num_scans=num_scans,
     )
 
 

@@ -53,7 +53,7 @@ def surroundings(folder: str | os.PathLike[str]) -> tuple[Cloud, Edges]:
     if not (work / "plan.json").is_file():
         raise FileNotFoundError(f"{folder}: the state of the run is gone ({work}); run edgel detect --as-one again")
     plan = Plan.read(work)
-    parts = [part for part in plan.spool.parts if part.num_points]
+    parts = [part for part in plan.spool.parts if part.num_points or part.num_scans]
     found = [edges_of(plan, part) for part in parts]
     if not found:
         raise ValueError(f"{folder}: has no points; run edgel detect --as-one on other files")
