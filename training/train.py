@@ -7,6 +7,11 @@ The trees of both screenings, by leaves of an octree and by points, say where an
 what they let through. The first trees classify each point by its own evidence. What the second ones hear of the
 neighbours' probabilities has to be what the first say of scenes they were not trained on: each half of the scenes is
 classified by trees trained on the other half.
+
+Landscapes teach what crowns of trees look like, and cost edges of parts. So these forests are each a mean of two: one
+has seen no landscape, the other has, away from its edges. The screenings, which shall lose no edge, have seen none.
+
+The weights in the package are of an earlier form of this, since they find more of small roofs: see docs/decisions.md.
 """
 
 from __future__ import annotations
