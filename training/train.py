@@ -1,19 +1,24 @@
 """Train the trees of `edgel._surface` on random scenes of `edgel.synth`, and write their weights into the package.
 
-Run: python training/train.py [--scenes 2000] (15 minutes on two cores; evidence is kept in training/cache). Needs
+Run: python training/train.py [--scenes 2200] (half an hour on two cores; evidence is kept in training/cache). Needs
 `pip install edgel[train]`. Nothing of the benchmark and no real data is seen in training: see `examples.example`.
 
 The trees of both screenings, by leaves of an octree and by points, say where an edge could be; the others learn from
 what they let through. The first trees classify each point by its own evidence. What the second ones hear of the
 neighbours' probabilities has to be what the first say of scenes they were not trained on: each half of the scenes is
 classified by trees trained on the other half.
+
+Landscapes teach what crowns of trees look like, and cost edges of parts. So these forests are each a mean of two: one
+has seen no landscape, the other has, away from its edges. The screenings, which shall lose no edge, have seen none.
+
+The weights in the package are of an earlier form of this, since they find more of small roofs: see docs/decisions.md.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from multiprocessing import get_context
 from multiprocessing.pool import Pool
@@ -21,7 +26,7 @@ from pathlib import Path
 
 import lightgbm
 import numpy as np
-from training_examples import example
+from training_examples import example, is_landscape
 
 import edgel._surface
 from edgel import metrics
@@ -30,7 +35,7 @@ from edgel._surface.classify import SECOND as LIKELY
 from edgel._surface.evidence import Evidence
 from edgel._surface.forest import Forest, evaluate, read_forests, write_forests
 from edgel._surface.screen import POINT as SCREENED
-from edgel._surface.training import add_context, screen_cloud, screening_features
+from edgel._surface.training import add_context, blend, screen_cloud, screening_features
 
 CACHE = Path(__file__).parent / "cache"
 OUT = Path(edgel._surface.__file__).parent / "weights.npz"
@@ -42,6 +47,7 @@ TURNS = 3  # ways in which each is turned for the leaves, whose cells lie along 
 LOOSE = 0.5  # of the screening's threshold: points that it would nearly let through are gathered in training too
 UNLIKELY = 0.02  # share of all the others
 NEAR, SHARE_NEAR, SHARE_FAR = 3.0, 0.4, 0.15  # of points that are no edge, within so many spacings of one or not
+OUTDOORS = 0.4  # weight of the forests that have seen landscapes: one half costs eaves, a quarter leaves crowns full
 VAGUE = 0.07  # of its spread among the scenes: error added, point by point, to the cloud's statistics
 OPTIONS = {
     "objective": "binary",
@@ -105,7 +111,7 @@ class Table:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scenes", type=int, default=2000)
+    parser.add_argument("--scenes", type=int, default=2200)
     parser.add_argument("--out", type=Path, default=OUT)
     options = parser.parse_args()
     CACHE.mkdir(parents=True, exist_ok=True)
@@ -127,7 +133,8 @@ def one_thread() -> None:
 
 def train_screenings(pool: Pool, scenes: int) -> dict[str, Forest]:
     """Train the forests of both screenings."""
-    points, leaves = (Table.join(tables) for tables in zip(*pool.imap(cheap_evidence, range(scenes)), strict=True))
+    seeds = [seed for seed in range(2 * scenes) if not is_landscape(seed)][:scenes]
+    points, leaves = (Table.join(tables) for tables in zip(*pool.imap(cheap_evidence, seeds), strict=True))
     cloud = features.POINT.block("cloud")
     spread = points.features[:, cloud].std(axis=0)
     np.save(SPREAD, spread)
@@ -196,32 +203,47 @@ def blur(rows: np.ndarray, columns: slice, spread: np.ndarray, seed: int) -> Non
 
 def train_first(pool: Pool, scenes: int) -> tuple[dict[str, Forest], list[dict[str, Forest]]]:
     """Train the first forests on all scenes; and for each half of them, by kind, on the scenes of the other half."""
-    tables = list(map(own_evidence, range(scenes)))
-    np.save(CACHE / "half.npy", np.concatenate([np.full(len(t.weights), seed % 2) for seed, t in enumerate(tables)]))
-    table = Table.join(tables)
-    table.save()
+    table = keep(map(own_evidence, range(scenes)))
     creases, outlines = table.labels.sum(axis=0)
     print(f"\n{len(table.weights):,} points, {creases:,} on creases, {outlines:,} on outlines", flush=True)
-    jobs = [(kind, FIRST[kind], half) for half in (None, 0, 1) for kind in KINDS]
-    forests = {(half, kind): f for (kind, _, half), f in zip(jobs, pool.imap(train, jobs), strict=True)}
-    first = {f"first {kind}": forests[None, kind] for kind in KINDS}
-    return first, [{kind: forests[half, kind] for kind in KINDS} for half in (0, 1)]
+    wanted = [(kind, half) for half in (None, 0, 1) for kind in KINDS]
+    jobs = [(kind, FIRST[kind], half, outdoors) for kind, half in wanted for outdoors in (False, True)]
+    both = dict(zip(wanted, pairs_of(pool.imap(train, jobs)), strict=True))
+    first = {f"first {kind}": blend(*both[kind, None], OUTDOORS) for kind in KINDS}
+    return first, [{kind: blend(*both[kind, half], OUTDOORS) for kind in KINDS} for half in (0, 1)]
 
 
 def train_second(pool: Pool, scenes: int, halves: list[dict[str, Forest]]) -> dict[str, Forest]:
     """Train the second forests, by what those of the halves say of the neighbours."""
     jobs = [(seed, halves[seed % 2]) for seed in range(scenes)]
-    Table.join(pool.imap(evidence_in_context, jobs, chunksize=4)).save()
+    keep(pool.imap(evidence_in_context, jobs, chunksize=4))
     print("the first trees are trained", flush=True)
-    jobs = [(kind, SECOND[kind], None) for kind in KINDS]
-    return dict(zip(KINDS, pool.map(train, jobs, chunksize=1), strict=True))
+    jobs = [(kind, SECOND[kind], None, outdoors) for kind in KINDS for outdoors in (False, True)]
+    pairs = pairs_of(pool.imap(train, jobs))
+    return {kind: blend(*pair, OUTDOORS) for kind, pair in zip(KINDS, pairs, strict=True)}
+
+
+def keep(tables: Iterable[Table]) -> Table:
+    """Keep the rows to learn from, a table for each seed, and what scenes they are of."""
+    tables = list(tables)
+    rows = [len(table.weights) for table in tables]
+    np.save(CACHE / "half.npy", np.repeat(np.arange(len(tables)) % 2, rows))
+    np.save(CACHE / "landscape.npy", np.repeat([is_landscape(seed) for seed in range(len(tables))], rows))
+    joined = Table.join(tables)
+    joined.save()
+    return joined
 
 
 def learned(stored: Mapping[str, np.ndarray], seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Which points with evidence are learned from, and how much each counts: all on edges, a share of the others."""
+    """Which points with evidence are learned from, and how much each counts: all on edges, a share of the others.
+
+    Of landscapes what is near an edge is left out: where boxes overlap, truth and what beams could see differ.
+    """
     edge = stored["labels"].any(axis=1)
     share = np.where(edge, 1.0, np.where(stored["near"], SHARE_NEAR, SHARE_FAR))
     kept = stored["counts"] & (np.random.default_rng([seed, 1]).random(len(edge)) < share)
+    if is_landscape(seed):
+        kept &= ~edge & ~stored["near"]
     return kept, (1 / (share * stored["share"])).astype(np.float32)
 
 
@@ -249,11 +271,14 @@ def evidence_in_context(job: tuple[int, dict[str, Forest]]) -> Table:
     return Table(rows, stored["labels"][kept & likely], weights[kept & likely])
 
 
-def train(job: tuple[str, Size, int | None]) -> Forest:
-    """Train a forest of one kind on the table kept last, of all scenes or of those that are not of one half."""
-    kind, size, half = job
+def train(job: tuple[str, Size, int | None, bool]) -> Forest:
+    """Train a forest of one kind on the table kept last: on all scenes or one half's complement, outdoors or not."""
+    kind, size, half, outdoors = job
     table = Table.load()
-    rows = slice(None) if half is None else np.flatnonzero(np.load(CACHE / "half.npy") != half)
+    left_out = np.load(CACHE / "half.npy") == (-1 if half is None else half)
+    if not outdoors:
+        left_out |= np.load(CACHE / "landscape.npy")
+    rows = np.flatnonzero(~left_out)
     return grow(table.features[rows], table.labels[rows, KINDS.index(kind)], table.weights[rows], size)
 
 
@@ -261,6 +286,11 @@ def grow(rows: np.ndarray, wanted: np.ndarray, weights: np.ndarray, size: Size) 
     data = lightgbm.Dataset(rows, wanted, weight=weights)
     options = OPTIONS | {"num_leaves": size.leaves, "learning_rate": size.rate}
     return flatten(lightgbm.train(options, data, size.trees))
+
+
+def pairs_of(forests: Iterator[Forest]) -> Iterator[tuple[Forest, Forest]]:
+    """Take two at a time."""
+    return zip(forests, forests, strict=True)
 
 
 def flatten(model: lightgbm.Booster) -> Forest:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from training_examples import example
+from training_examples import example, is_landscape
 
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.scan_lines import scan_line_stretch
@@ -10,7 +10,7 @@ from edgel._surface import classify, cloud_statistics, screen
 from edgel._surface.features import LEAF, NUM_EVIDENCE, NUM_SCREEN, POINT
 from edgel._surface.forest import evaluate, load_forests
 from edgel._surface.smoothing import smoothed
-from edgel._surface.training import add_context, screen_cloud, screening_features
+from edgel._surface.training import add_context, blend, screen_cloud, screening_features
 
 
 @pytest.fixture(scope="module", params=[0, 1, 13])  # a whole surface, a view, a relief
@@ -32,6 +32,25 @@ def test_the_seed_decides():
     assert one.xyz.tobytes() == same.xyz.tobytes()
     assert one.labels.tobytes() == same.labels.tobytes()
     assert not np.array_equal(one.xyz, other.xyz)
+
+
+def test_blended_forests_have_the_mean_of_both_logits():
+    forests = load_forests()
+    rows = np.random.default_rng(0).random((500, len(POINT)), np.float32)
+    one, other = forests["crease"], forests["outline"]
+    p, q, both = (evaluate(forest, rows) for forest in (one, other, blend(one, other, 0.25)))
+    inner = (np.minimum(p, q) > 1e-9) & (np.maximum(p, q) < 1 - 1e-9)
+    assert inner.mean() > 0.5
+    p, q, both = (np.log(each[inner] / (1 - each[inner])) for each in (p, q, both))
+    np.testing.assert_allclose(both, 0.75 * p + 0.25 * q, atol=1e-5)
+
+
+def test_an_eighth_of_the_examples_are_landscapes():
+    landscapes = [seed for seed in range(400) if is_landscape(seed)]
+    assert 35 <= len(landscapes) <= 65
+    made = example(landscapes[0])
+    assert made.spacing == 1.0
+    assert np.ptp(made.xyz[:, :2]) > np.ptp(made.xyz[:, 2])
 
 
 def test_screening_features_are_in_the_layouts(made):

@@ -91,3 +91,15 @@ def add_context(
     """
     index = build_index(np.ascontiguousarray(xyz))
     return with_context(index, index.places_of(points), evidence, crease, outline, scan_line_stretch(index))
+
+
+def blend(one: Forest, other: Forest, share: float) -> Forest:
+    """Put two forests together, so that their logit is the mean of both; the other's counts for a share of it."""
+    nodes = len(one.feature)
+    weighted = (np.where(f.feature < 0, w * f.threshold, f.threshold) for f, w in ((one, 1 - share), (other, share)))
+    return Forest(
+        roots=np.concatenate([one.roots, other.roots + nodes]),
+        feature=np.concatenate([one.feature, other.feature]),
+        threshold=np.concatenate(list(weighted), dtype=np.float32),
+        right=np.concatenate([one.right, other.right + nodes]),
+    )
