@@ -81,12 +81,9 @@ class Run:
         except subprocess.TimeoutExpired:
             self.process.kill()
             return "said nothing and was stopped"
-        self.process.wait()
-        return (
-            [*said.strip().splitlines(), "killed"][-1 if self.process.returncode < 0 else -2]
-            if self.process.returncode
-            else ""
-        )
+        if self.process.wait() < 0:
+            return "killed"
+        return said.strip().splitlines()[-1] if self.process.returncode else ""
 
 
 @dataclass
@@ -169,8 +166,13 @@ def strike(victim: str, run: Run, out: Path, on: Cluster | None, rng: random.Ran
         os.kill(run.process.pid, signal.SIGKILL)
 
 
-def kills(victim: str, moments: int, folder: Path, files: list[str], wanted: str, rng: random.Random) -> str:
-    """Kill so many runs, each once, and finish them; returns a row of the table."""
+def kills(
+    victim: str, moments: int, folder: Path, files: list[str], lines: int, wanted: str, rng: random.Random
+) -> str:
+    """Kill so many runs, each once, and finish them; returns a row of the table.
+
+    `lines` and `wanted` are how many lines an undisturbed run says, and the hash of what it finds.
+    """
     alone = victim in ("client", "disk")
     same = twice = flying = told = hung = by_itself = 0
     done = []
@@ -182,7 +184,7 @@ def kills(victim: str, moments: int, folder: Path, files: list[str], wanted: str
                 whole.enter_context(small_disk(place))
             on = None if alone else stack.enter_context(cluster(folder))
             run = Run.start(files, out, on.address if on else "")
-            while not run.wait_for(int(rng.uniform(1, LINES))):
+            while not run.wait_for(int(rng.uniform(1, lines))):
                 raise SystemExit(f"{victim}: the run ended before it was struck: {run.end()}")
             time.sleep(rng.uniform(0, 0.05))
             strike(victim, run, out, on, rng)
@@ -213,11 +215,7 @@ def kills(victim: str, moments: int, folder: Path, files: list[str], wanted: str
     )
 
 
-LINES = 1
-
-
 def main() -> None:
-    global LINES  # lines of an undisturbed run
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("victims", nargs="*", default=VICTIMS)
     parser.add_argument("--moments", type=int, default=10)
@@ -231,13 +229,13 @@ def main() -> None:
         run = Run.start(files, folder / "undisturbed")
         if error := run.end():
             raise SystemExit(error)
-        LINES, wanted = len(run.lines) - 1, digest(folder / "undisturbed")
+        lines, wanted = len(run.lines) - 1, digest(folder / "undisturbed")
         print(
             "| what died | same answer | whole results done twice | half written | done before | went on alone | said so |"
         )
         print("|---|---|---|---|---|---|---|", flush=True)
         for victim in options.victims:
-            print(kills(victim, options.moments, folder, files, wanted, rng), flush=True)
+            print(kills(victim, options.moments, folder, files, lines, wanted, rng), flush=True)
 
 
 if __name__ == "__main__":

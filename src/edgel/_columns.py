@@ -29,15 +29,15 @@ def set_aside(taken: Iterable[str], names: Iterable[str]) -> dict[str, str]:
     >>> set_aside(["label", "nx", "input_nx"], ["nx", "ny", "nz"])
     {'nx': 'input_nx_2'}
     """
-    ours, renamed = {_plain(name) for name in names}, {}
-    used = {_plain(name) for name in taken} | ours
+    ours, renamed = {plain(name) for name in names}, {}
+    used = {plain(name) for name in taken} | ours
     for name in taken:
-        if _plain(name) in ours:
+        if plain(name) in ours:
             stem = new = f"input_{name.strip()}"
             number = 2
-            while _plain(new) in used:
+            while plain(new) in used:
                 new, number = f"{stem}_{number}", number + 1
-            used.add(_plain(new))
+            used.add(plain(new))
             renamed[name] = new
     return renamed
 
@@ -48,5 +48,6 @@ def make_room(cloud: Cloud, names: Iterable[str]) -> Cloud:
     return replace(cloud, attributes={new.get(name, name): values for name, values in cloud.attributes.items()})
 
 
-def _plain(name: str) -> str:
+def plain(name: str) -> str:
+    """Return how names of columns are compared: blanks are underscores, and case does not matter."""
     return "_".join(name.split()).lower()

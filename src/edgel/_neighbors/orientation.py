@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from edgel._columns import plain
 from edgel._kernels.frames import tangents
 from edgel._kernels.parallel import kernel
 from edgel._neighbors.kdtree import NeighborIndex
@@ -63,14 +64,14 @@ def who_knows(orient: str, cloud: Cloud, *, sensor: bool) -> tuple[str, np.ndarr
 
 def has_normals(cloud: Cloud) -> bool:
     """Whether a cloud has columns nx, ny and nz."""
-    return {*NORMALS} <= {"_".join(name.split()).lower() for name in cloud.attributes}
+    return {*NORMALS} <= {plain(name) for name in cloud.attributes}
 
 
 def own_normals(cloud: Cloud) -> np.ndarray | None:
     """Return the normals (N, 3) that came with a cloud as nx, ny, nz, None where it has none."""
     if not has_normals(cloud):
         return None
-    names = {"_".join(name.split()).lower(): name for name in cloud.attributes}
+    names = {plain(name): name for name in cloud.attributes}
     columns = [cloud.attributes[names[name]] for name in NORMALS]
     if any(column.ndim != 1 or column.dtype.kind not in "fiu" for column in columns):
         return None

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from edgel._columns import make_room
 from edgel._detect import detect
 from edgel._neighbors.estimate import estimate_normals
 from edgel._neighbors.kdtree import build_index
@@ -112,10 +113,7 @@ def _turned_outwards(cloud: Cloud) -> Cloud:
     finite, _ = without_no_return(cloud, check_points(cloud), None)
     normals = np.full((len(cloud), 3), np.nan)
     normals[finite.rows] = outward_normals(build_index(finite.xyz))
-    others = {
-        name: column for name, column in cloud.attributes.items() if "_".join(name.split()).lower() not in NORMALS
-    }
-    return replace(cloud, attributes=others | dict(zip(NORMALS, normals.T, strict=True)))
+    return make_room(cloud, NORMALS).with_attributes(**dict(zip(NORMALS, normals.T, strict=True)))
 
 
 def shared_planes(side: Prepared) -> float:

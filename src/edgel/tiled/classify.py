@@ -154,9 +154,9 @@ def _look(
 
 
 def _fits_within(window: Window, places: np.ndarray, count: int) -> np.ndarray:
-    """Whether so many as were measured nearest to some places (M,), ascending, lie in the window, (M,) bool.
+    """Whether the window holds so many nearest of the points at some places (M,), ascending, (M,) bool.
 
-    Nearest to where the points are looked at, and to where they were measured.
+    Of all points as they were measured those nearest to where each is looked at, and to where it was measured.
     """
     index, measured = window.index, window.measured
     within = window.within(measured, at_places(index, places, stretch=window.stretch), count)

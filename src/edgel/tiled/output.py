@@ -26,10 +26,8 @@ def edges_of(plan: Plan, part: Part) -> Edges:
     """Gather the edge points of one file from the tiles that it reaches into."""
     if part.num_scans:
         return _edges_of_scans(plan, part)
-    low, high = (np.array(corner[:2]) for corner in (part.low, part.high))
-    box = Box(tuple(low.tolist()), tuple(np.nextafter(high, np.inf).tolist()))
     keys, columns = [np.zeros(0, np.int64)], {name: [none] for name, none in no_edges().items()}
-    for tile in plan.around(box) if part.num_points else []:
+    for tile in plan.around(Box.around(np.array([part.low, part.high]))) if part.num_points else []:
         with plan.load("label", tile) as found:
             mine = found["key"] >> ROWS == part.number
             keys.append(found["key"][mine])
