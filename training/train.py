@@ -1,7 +1,7 @@
 """Train the trees of `edgel._surface` on random scenes of `edgel.synth`, and write their weights into the package.
 
 Run: python training/train.py [--scenes 2200] (half an hour on two cores; evidence is kept in training/cache). Needs
-`pip install edgel[train]`. Nothing of the benchmark and no real data is seen in training: see `examples.example`.
+`pip install edgel[train]`. Nothing of the benchmark and no real data is seen in training: see `training_examples`.
 
 The trees of both screenings, by leaves of an octree and by points, say where an edge could be; the others learn from
 what they let through. The first trees classify each point by its own evidence. What the second ones hear of the
