@@ -30,8 +30,8 @@ _ORDER = (EdgeKind.CREASE, EdgeKind.BOUNDARY, EdgeKind.OCCLUDING, EdgeKind.COLOR
 def assemble(strands: Strands, points: EdgePoints, edges: Edges, origin: np.ndarray, crs: str | None) -> Curves:
     """Make curves of strands."""
     nodes = touch(strands, meet(ends_of(strands), strands.shape, strands.spacing))
-    nodes = without_unsure(nodes, points.position, noise_of(strands, strands.spacing), strands.spacing)
     nodes, through = meet_through(strands, nodes)
+    nodes = without_unsure(nodes, through, points.position, noise_of(strands, strands.spacing), strands.spacing)
     strands = end_at_nodes(strands, nodes)
     kept = np.flatnonzero(_long_enough(strands, nodes))
     number = np.full(len(strands), -1)

@@ -96,18 +96,21 @@ def meet(ends: Ends, shapes: np.ndarray, spacing: np.ndarray) -> Nodes:
     return Nodes(position[:found], std[:found], is_corner[:found], of_end)
 
 
-def without_unsure(nodes: Nodes, position: np.ndarray, noise: float, spacing: np.ndarray) -> Nodes:
+def without_unsure(
+    nodes: Nodes, through: np.ndarray, position: np.ndarray, noise: float, spacing: np.ndarray
+) -> Nodes:
     """Leave out nodes of two curves whose place is unsure, or where no edge point (E, 3) is.
 
     A corner of faces has three curves; where there are two, a fillet may run past it, or a curve may just end. Takes
-    the noise in spacings and the spacing (N,) of the curves.
+    which curves (T, 2) pass through which nodes, the noise in spacings and the spacing (N,) of the curves.
     """
     count = len(nodes.position)
     if not count or noise > _NOISY:
         return nodes
     ending = nodes.of_end[nodes.of_end >= 0]
-    uses = np.bincount(ending, minlength=count)
-    h = np.bincount(ending, np.repeat(spacing, 2)[nodes.of_end.ravel() >= 0], count) / np.maximum(uses, 1)
+    ends = np.bincount(ending, minlength=count)
+    uses = ends + np.bincount(through[:, 0], minlength=count)
+    h = np.bincount(ending, np.repeat(spacing, 2)[nodes.of_end.ravel() >= 0], count) / np.maximum(ends, 1)
     far = knn(build_index(position), nodes.position, 1).distances[:, 0]
     unsure = nodes.std > (_UNSURE + _BY_NOISE * noise) * h
     lone = far > (_LONE + _BY_NOISE * noise) * h
