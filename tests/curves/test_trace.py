@@ -75,6 +75,34 @@ def test_no_small_square_is_a_circle():
     assert (curves.kind == CurveKind.LINE).sum() > 0.9 * len(curves)
 
 
+def rounded_block(radius, seed=0):
+    """A block whose upright edges are rounded, above z = 0, with a spacing of 1."""
+    rng = np.random.default_rng(seed)
+    inner, height = np.array([15.0, 11.0]) - radius, 12.0
+    flat = rng.uniform(-1, 1, (40_000, 2)) * (inner + radius)
+    top = np.c_[flat, np.full(len(flat), height)]
+    top = top[np.linalg.norm(np.maximum(np.abs(flat) - inner, 0), axis=1) <= radius]
+    turn, start = rng.uniform(0, 2 * np.pi, 40_000), rng.uniform(-1, 1, (40_000, 2)) * inner
+    ways = np.c_[np.cos(turn), np.sin(turn)]
+    axis = rng.integers(2, size=len(start))
+    straight = rng.random(len(start)) < inner.sum() / (inner.sum() + 0.5 * np.pi * radius)
+    wall = inner * np.sign(ways) + radius * ways
+    sides = np.sign(start) * (inner + radius)
+    wall[straight] = np.where(np.arange(2) == axis[straight, None], sides[straight], start[straight])
+    places = np.concatenate([top, np.c_[wall, rng.uniform(0, height, len(wall))]])
+    return places[synth.poisson_disc(places, 0.752)]
+
+
+@pytest.mark.parametrize("radius", [3.0, 3.5, 4.0])
+def test_rounded_corners_are_none(radius):
+    """Lines on either side would meet 1.2 spacings and more off the edge, where no edge point is."""
+    places = rounded_block(radius)
+    curves = trace(places, edgel.detect(places, kinds="crease", min_strength=edgel.curves.FAINT))
+    ideal = np.c_[np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]]) * [15.0, 11.0], np.full(4, 12.0)]
+    assert (KDTree(ideal).query(curves.vertices)[0] > 0.7).all()
+    assert curves.length.sum() > 60
+
+
 def test_order_of_points_and_threads_do_not_matter(block, monkeypatch):
     scene, edges = block
     before = trace(scene.cloud, edges)
