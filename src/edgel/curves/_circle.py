@@ -152,3 +152,17 @@ def tangent_of(shape, x, y, z):
         a * shape[7] - b * shape[4],
         a * shape[8] - b * shape[5],
     )
+
+
+@routine
+def lean(shape, by_u, by_v):
+    """Lean the direction of a line, or the axis of a circle, by slopes along both axes across it."""
+    u, v, w = shape[3:6], shape[6:9], shape[9:12]
+    length, inside = math.sqrt(1.0 + by_u * by_u + by_v * by_v), 0.0
+    for axis in range(3):
+        w[axis] = (w[axis] + by_u * u[axis] + by_v * v[axis]) / length
+        inside += w[axis] * u[axis]
+    length = math.sqrt(1.0 - inside * inside)
+    for axis in range(3):
+        u[axis] = (u[axis] - inside * w[axis]) / length
+    v[0], v[1], v[2] = w[1] * u[2] - w[2] * u[1], w[2] * u[0] - w[0] * u[2], w[0] * u[1] - w[1] * u[0]

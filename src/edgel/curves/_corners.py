@@ -96,9 +96,7 @@ def meet(ends: Ends, shapes: np.ndarray, spacing: np.ndarray) -> Nodes:
     return Nodes(position[:found], std[:found], is_corner[:found], of_end)
 
 
-def without_unsure(
-    nodes: Nodes, through: np.ndarray, position: np.ndarray, noise: float, spacing: np.ndarray
-) -> Nodes:
+def without_unsure(nodes: Nodes, through: np.ndarray, position: np.ndarray, noise: float, spacing: np.ndarray) -> Nodes:
     """Leave out nodes of two curves whose place is unsure, or where no edge point (E, 3) is.
 
     A corner of faces has three curves; where there are two, a fillet may run past it, or a curve may just end. Takes

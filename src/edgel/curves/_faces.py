@@ -14,7 +14,7 @@ import numpy as np
 
 from edgel._kernels.parallel import kernel, routine
 from edgel.curves import _fit
-from edgel.curves._circle import RADIUS
+from edgel.curves._circle import RADIUS, lean
 from edgel.curves._equations import LEAST, TOLERANCES, collect, collect_edge, is_small, put_together, solve, spread_of
 from edgel.curves._fit import BENT, CENTRE, HEIGHT, SIZE, TURN, UNKNOWNS
 from edgel.curves._gather import gather
@@ -177,15 +177,7 @@ def _move(shape, faces, inward, bend, step, free, h, lever):
             step[CENTRE] * shape[3 + axis] + step[CENTRE + 1] * shape[6 + axis] + step[HEIGHT] * shape[9 + axis]
         )
     shape[RADIUS] += step[SIZE] * h
-    u, v, w = shape[3:6], shape[6:9], shape[9:12]
-    length, inside = math.sqrt(1.0 + tx * tx + ty * ty), 0.0
-    for axis in range(3):
-        w[axis] = (w[axis] + tx * u[axis] + ty * v[axis]) / length
-        inside += w[axis] * u[axis]
-    length = math.sqrt(1.0 - inside * inside)
-    for axis in range(3):
-        u[axis] = (u[axis] - inside * w[axis]) / length
-    v[0], v[1], v[2] = w[1] * u[2] - w[2] * u[1], w[2] * u[0] - w[0] * u[2], w[0] * u[1] - w[1] * u[0]
+    lean(shape, tx, ty)
     for k in range(2):
         bend[k] = bend[k] + step[BENT + k] / h if free[BENT + k] else 0.0
         # Faces turn about the edge: towards where they go.

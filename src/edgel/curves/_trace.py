@@ -9,6 +9,7 @@ import numpy as np
 from edgel.cloud import as_cloud, check_points
 from edgel.curves._assemble import assemble
 from edgel.curves._curves import Curves
+from edgel.curves._outermost import along_outermost
 from edgel.curves._points import edge_points
 from edgel.curves._shapes import find_shapes
 from edgel.curves._strands import find_strands
@@ -63,5 +64,5 @@ def trace(points: Any, edges: Edges) -> Curves:
     origin = finite.xyz.mean(axis=0)
     xyz = finite.xyz - origin
     found = edge_points(xyz, np.searchsorted(finite.rows, edges.index), edges, origin)
-    strands = find_strands(find_shapes(found), found)
+    strands = along_outermost(find_strands(find_shapes(found), found), found)
     return assemble(strands, found, edges, origin, cloud.crs)
