@@ -30,6 +30,7 @@ _BIN, _FIRST = 0.6, 2  # spacings of depth, and the first of them, counted from 
 _THIN, _BLUR, _SHALLOW = 0.35, 0.4, 1.3  # of the points at the edge; spacings
 _SQUARE = 0.03  # of a face's normal: so near the axis or across it, a plane or a cylinder is meant
 _CHANCE = 2.2  # deviations of an amplitude
+_ROUNDEST = 0.0015  # spacings: chords of meshes, and faces that bend a little, leave as much of a radius unsure
 _LIMIT = 0.3  # radians: no round turns anything by more
 
 
@@ -99,7 +100,7 @@ def fit_faces(
                 fit[_fit.STATE] = _fit.MEASURED if both else _fit.EDGE_ALONE
                 break
         if fit[_fit.STATE] != _fit.NONE:
-            _write(shape, faces, inward, bend, number, spread, covariance, fit)
+            _write(shape, faces, inward, bend, number, spread, covariance, h, fit)
             fit[_fit.RIPPLE] = 0.0 if is_line else _ripple(shape, near, h, depth, sigma, faces, inward, bend)
 
 
@@ -226,7 +227,7 @@ def _ripple(shape, near, h, depth, sigma, faces, inward, bend):
 
 
 @routine
-def _write(shape, faces, inward, bend, number, spread, covariance, fit):
+def _write(shape, faces, inward, bend, number, spread, covariance, h, fit):
     for k in range(2):
         # Where there is one face alone, the other distance is that along it.
         none = faces[k, 0] == 0.0 and faces[k, 1] == 0.0
@@ -240,6 +241,7 @@ def _write(shape, faces, inward, bend, number, spread, covariance, fit):
     for m in range(CENTRE, TURN):
         place += covariance[m, m]
     fit[_fit.POSITION_STD] = math.sqrt(place)
-    fit[_fit.RADIUS_STD] = math.sqrt(covariance[SIZE, SIZE]) if shape[RADIUS] > 0.0 else math.nan
+    square = covariance[SIZE, SIZE] + (_ROUNDEST * h) ** 2
+    fit[_fit.RADIUS_STD] = math.sqrt(square) if shape[RADIUS] > 0.0 else math.nan
     fit[_fit.ANGLE_STD] = math.sqrt(covariance[TURN, TURN] + covariance[TURN + 1, TURN + 1])
     fit[_fit.TURN_STD] = math.sqrt(covariance[0, 0] + covariance[1, 1])
