@@ -3,7 +3,7 @@
 import naive
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from edgel._neighbors.kdtree import build_index
@@ -32,6 +32,7 @@ def test_planes_are_those_of_the_naive_neighbours(seed, count, k, lattice):
 
 
 @given(SEEDS, st.sampled_from([1, 7, 8, 9, 200]), st.integers(3, 20))
+@example(1893, 200, 3)  # exactly k within the reach of a group
 def test_some_of_the_points_have_the_planes_of_all(seed, some, k):
     rng = np.random.default_rng(seed)
     index = build_index(rng.normal(size=(300, 3)) * [1, 1, 0.01])

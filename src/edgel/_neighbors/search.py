@@ -84,7 +84,8 @@ def _divide(scratch, count, k, reach, within):
         one_less, one_more = inside == k - 1, inside == k + 1
         share = (k + 0.5 - as_floats(fewer)) / (as_floats(more) - as_floats(fewer))
         share = share if step % 3 < 2 else spread(0.5)
-        limit = where(inside == k, limit, low + (high - low) * share)
+        # Where exactly k lie within the reach the share is above one; beyond it other points may lie.
+        limit = where(inside == k, limit, smaller(low + (high - low) * share, high))
         limit = where(one_less, over, where(one_more, under * _LESS, limit))
         if bits(one_less | one_more | (inside == k) | (above == high)) == 255:  # the last: nothing but ties between
             break
