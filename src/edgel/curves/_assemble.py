@@ -8,7 +8,7 @@ import numpy as np
 
 from edgel.curves import _fit
 from edgel.curves._circle import RADIUS
-from edgel.curves._corners import Nodes, meet, without_unsure
+from edgel.curves._corners import Nodes, meet, without_passed, without_unsure
 from edgel.curves._curves import CurveKind, Curves
 from edgel.curves._gather import on_shapes
 from edgel.curves._loops import find_loops
@@ -30,8 +30,9 @@ _ORDER = (EdgeKind.CREASE, EdgeKind.BOUNDARY, EdgeKind.OCCLUDING, EdgeKind.COLOR
 def assemble(strands: Strands, points: EdgePoints, edges: Edges, origin: np.ndarray, crs: str | None) -> Curves:
     """Make curves of strands."""
     nodes = touch(strands, meet(ends_of(strands), strands.shape, strands.spacing))
-    nodes, through = meet_through(strands, nodes)
-    nodes = without_unsure(nodes, through, points.position, noise_of(strands, strands.spacing), strands.spacing)
+    noise = noise_of(strands, strands.spacing)
+    nodes, through = meet_through(strands, without_unsure(nodes, noise, strands.spacing))
+    nodes = without_passed(nodes, through, strands.shape, points.position, noise, strands.spacing)
     strands = end_at_nodes(strands, nodes)
     kept = np.flatnonzero(_long_enough(strands, nodes))
     number = np.full(len(strands), -1)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from edgel._kernels.eigen import smallest_eigenpair
 from edgel._kernels.frames import tangents
 from edgel._kernels.parallel import routine
@@ -111,6 +113,13 @@ def fit_circle(points, rows, shape):
     for i in rows:
         total += offset_of(shape, points[i, 0], points[i, 1], points[i, 2]) ** 2
     return total / count
+
+
+def offsets(shapes: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Return the distances (N,) of places (N, 3) from shapes (N, 13), each from its own; NaN where it has none."""
+    x, y, z = (np.einsum("ij,ij->i", places - shapes[:, :3], shapes[:, k : k + 3]) for k in (3, 6, 9))
+    rho = np.hypot(x, y)
+    return np.where(shapes[:, RADIUS] == 0, rho, np.hypot(rho - shapes[:, RADIUS], z))
 
 
 @routine

@@ -10,7 +10,7 @@ import numpy as np
 from edgel._kernels.parallel import kernel, routine
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import knn
-from edgel.curves._circle import RADIUS, offset_of, tangent_of
+from edgel.curves._circle import RADIUS, offset_of, offsets, tangent_of
 
 REACH = 3.5
 """Spacings: so far from where its points end a curve meets others."""
@@ -18,9 +18,9 @@ _ASIDE = 0.7  # spacings: farther from a curve lies no corner of it, unless the 
 _MOST = 8  # ends near each that are tried
 PRIOR = 3.0  # spacings: standard deviation of a corner about the ends, where no face decides
 _FLOOR = 0.02  # spacings: no face is surer
-_UNSURE, _BY_NOISE, _LONE, _NOISY = 0.4, 0.8, 0.9, 0.2
-"""Spacings: corners of two curves that are less sure, what noise adds to that, how far edge points may be;
-and the noise from which on neither tells right from wrong."""
+_UNSURE, _LONE, _PASSED, _BY_NOISE, _NOISY = 0.4, 0.9, 0.3, 0.8, 0.2
+"""Spacings: corners of two curves that are less sure, how far the nearest edge point may be from one, and how far
+that may be from both curves; what noise adds to each, and the noise from which on none tells right from wrong."""
 CORNER = math.cos(math.radians(20.0))  # between tangents: nearer to straight the joint is smooth
 
 
@@ -96,24 +96,46 @@ def meet(ends: Ends, shapes: np.ndarray, spacing: np.ndarray) -> Nodes:
     return Nodes(position[:found], std[:found], is_corner[:found], of_end)
 
 
-def without_unsure(nodes: Nodes, through: np.ndarray, position: np.ndarray, noise: float, spacing: np.ndarray) -> Nodes:
-    """Leave out nodes of two curves whose place is unsure, or where no edge point (E, 3) is.
+def without_unsure(nodes: Nodes, noise: float, spacing: np.ndarray) -> Nodes:
+    """Leave out corners of two curves whose place is unsure: a corner of faces has three, and a curve may just end.
 
-    A corner of faces has three curves; where there are two, a fillet may run past it, or a curve may just end. Takes
-    which curves (T, 2) pass through which nodes, the noise in spacings and the spacing (N,) of the curves.
+    Takes the noise in spacings and the spacing (N,) of the curves.
     """
-    count = len(nodes.position)
-    if not count or noise > _NOISY:
+    uses, h = _uses(nodes, spacing)
+    return _without(nodes, (uses == 2) & (nodes.std > (_UNSURE + _BY_NOISE * noise) * h), noise)
+
+
+def without_passed(
+    nodes: Nodes, through: np.ndarray, shapes: np.ndarray, position: np.ndarray, noise: float, spacing: np.ndarray
+) -> Nodes:
+    """Leave out corners of two curves past which edge points (E, 3) run from one to the other, as round fillets.
+
+    Takes which curves (T, 2) pass through which nodes, and the shapes (N, 13) of the curves, else as `without_unsure`.
+    """
+    if not len(nodes.position):
         return nodes
-    ending = nodes.of_end[nodes.of_end >= 0]
-    ends = np.bincount(ending, minlength=count)
-    uses = ends + np.bincount(through[:, 0], minlength=count)
-    h = np.bincount(ending, np.repeat(spacing, 2)[nodes.of_end.ravel() >= 0], count) / np.maximum(ends, 1)
-    far = knn(build_index(position), nodes.position, 1).distances[:, 0]
-    unsure = nodes.std > (_UNSURE + _BY_NOISE * noise) * h
-    lone = far > (_LONE + _BY_NOISE * noise) * h
-    out = nodes.is_corner & (uses == 2) & (unsure | lone)
-    of_end = np.where((nodes.of_end >= 0) & out[nodes.of_end], -1, nodes.of_end)
+    uses, h = _uses(nodes, spacing)
+    near = knn(build_index(position), nodes.position, 1)
+    curve = np.concatenate([np.nonzero(nodes.of_end >= 0)[0], through[:, 1]])
+    node = np.concatenate([nodes.of_end[nodes.of_end >= 0], through[:, 0]])
+    aside = np.full(len(h), np.inf)
+    np.fmin.at(aside, node, offsets(shapes[curve], position[near.points[node, 0]]))
+    passed = (near.distances[:, 0] > (_LONE + _BY_NOISE * noise) * h) & (aside > (_PASSED + _BY_NOISE * noise) * h)
+    return _without(nodes, (uses + np.bincount(through[:, 0], minlength=len(h)) == 2) & passed, noise)
+
+
+def _uses(nodes: Nodes, spacing: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return how many curves end at each node, (M,) int64, and their mean spacing (M,)."""
+    count, meeting = len(nodes.position), nodes.of_end >= 0
+    ends = np.bincount(nodes.of_end[meeting], minlength=count)
+    return ends, np.bincount(nodes.of_end[meeting], np.repeat(spacing, 2)[meeting.ravel()], count) / np.maximum(ends, 1)
+
+
+def _without(nodes: Nodes, out: np.ndarray, noise: float) -> Nodes:
+    """Leave out some nodes, if they are corners, and if noise lets the one kind be told from the other."""
+    if not len(out) or noise > _NOISY:
+        return nodes
+    of_end = np.where((nodes.of_end >= 0) & (nodes.is_corner & out)[nodes.of_end], -1, nodes.of_end)
     return replace(nodes, of_end=of_end)
 
 
