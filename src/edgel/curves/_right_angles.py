@@ -17,10 +17,10 @@ _STEEP = 0.9  # of a direction's rise: lines as steep have no direction in plan
 def right_angles(curves: Curves, within: float) -> Curves:
     """Turn lines in plan to the main direction of their neighbours, or across it, where they nearly lie so.
 
-    For outlines of buildings. The lines that are joined by nodes are one group; its main direction is the robust
-    mean over them, the longest first, right angles counted as none. A line turns about its middle, heights stay, and nodes move to where
-    the turned lines meet. Arcs, circles and polylines stay; lengths become those of the turned lines, other measures
-    stay.
+    For outlines of buildings. The lines that are joined by nodes are one group; its main direction is their robust
+    mean, the longer the surer, right angles counted as none. A line turns about its middle, heights stay, and nodes
+    move to where the turned lines meet. Arcs, circles and polylines stay; lengths become those of the turned lines,
+    other measures stay.
 
     Parameters
     ----------
