@@ -141,3 +141,17 @@ def test_queries_in_the_order_of_the_index_are_answered_as_any(seed, some):
         found = knn(index, queries, 5)
         np.testing.assert_array_equal(found.points, wanted.points, err_msg=name)
         np.testing.assert_array_equal(found.distances, wanted.distances, err_msg=name)
+
+
+def test_lists_kept_of_a_small_cloud_are_those_that_are_searched_for():
+    rng = np.random.default_rng(0)
+    xyz = np.concatenate([rng.integers(0, 6, (400, 3)).astype(float), rng.random((400, 3))])  # ties, twins, and none
+    kept, fresh = build_index(xyz), build_index(xyz)
+    some = rng.permutation(len(xyz))[:300]
+    knn(kept, every_place(kept), 32)
+    assert kept.lists
+    for k in (1, 9, 32, 64, 65):
+        mine, searched = knn(kept, at_points(kept, some), k), knn(fresh, at_points(fresh, some), k)
+        np.testing.assert_array_equal(mine.points, searched.points)
+        np.testing.assert_array_equal(mine.distances, searched.distances)
+    assert not fresh.lists

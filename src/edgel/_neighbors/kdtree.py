@@ -12,6 +12,7 @@ on their order, and those at one place follow one another by their rows.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -48,6 +49,11 @@ class NeighborIndex:
 
     def __len__(self) -> int:
         return len(self.order)
+
+    @cached_property
+    def lists(self) -> list[np.ndarray]:
+        """What `edgel._neighbors.knn` keeps of a small cloud: places and squared distances of the nearest of all."""
+        return []
 
     def at(self, places: np.ndarray) -> np.ndarray:
         """Return the coordinates at some places (M,), (M, 3) float64."""

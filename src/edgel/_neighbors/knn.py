@@ -17,11 +17,12 @@ from edgel._kernels.rows import aligned
 from edgel._kernels.simd import LANES, as_floats, bits, counted, counts_of, load, store
 from edgel._neighbors.candidates import CHUNK, gather_blocks, larger_scratch, make_scratch
 from edgel._neighbors.kdtree import NeighborIndex
-from edgel._neighbors.queries import Queries, anywhere, tree_of
+from edgel._neighbors.queries import Queries, TreeArrays, anywhere, every_place, tree_of
 from edgel._neighbors.search import first_of, nearest_of_eight
 from edgel._neighbors.stretched import list_stretched
 
 _SLICE = 1024  # queries whose neighbours exist at a time, for each thread
+_KEPT = 64  # nearest of every point that are kept of a cloud of one slice: most who ask, ask at all points for fewer
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,17 +90,37 @@ def visit_neighbors(
     """
     if not 1 <= num_neighbors <= len(index):
         raise ValueError(f"num_neighbors: expected 1 to {len(index)}, the number of points, got {num_neighbors}")
-    asked, tree = queries.arrays, tree_of(index)
+    tree, kept = tree_of(index), _kept_lists(index, queries, num_neighbors)
 
     def work(start: int, stop: int) -> None:
-        places = np.zeros((stop - start, num_neighbors), np.int64)  # a place even where no distance is a number
-        squared = np.empty((stop - start, num_neighbors))
-        _list(start, stop, asked, tree, places, squared)
+        if kept:
+            places, squared = (array[:, :num_neighbors].take(queries.places, axis=0) for array in kept)
+        else:
+            places, squared = _lists(start, stop, queries, tree, num_neighbors)
         if queries.are_stretched:
             list_stretched(start, stop, queries.xyz, tree, places, squared)
         visit(start, places, squared, queries.xyz, queries.targets, index.xyz, *arguments)
 
     run_slices(work, len(queries), size=_SLICE)
+
+
+def _kept_lists(index: NeighborIndex, queries: Queries, num_neighbors: int) -> list[np.ndarray]:
+    """Return the kept lists of a small cloud's points that hold what is asked for, or nothing."""
+    most = min(_KEPT, len(index))
+    if queries.places is None or len(index) > _SLICE or num_neighbors > most:
+        return []
+    if not index.lists and len(queries) == len(index):
+        index.lists[:] = _lists(0, len(index), every_place(index), tree_of(index), most)
+    return index.lists
+
+
+def _lists(
+    start: int, stop: int, queries: Queries, tree: TreeArrays, num_neighbors: int
+) -> tuple[np.ndarray, np.ndarray]:
+    places = np.zeros((stop - start, num_neighbors), np.int64)  # a place even where no distance is a number
+    squared = np.empty((stop - start, num_neighbors))
+    _list(start, stop, queries.arrays, tree, places, squared)
+    return places, squared
 
 
 @kernel

@@ -41,10 +41,13 @@ class Queries:
         stretch: see `edgel._neighbors.stretched`.
     targets : (M,) int64
         Where the results of each query go: a permutation.
+    places : (M,) int64 or None
+        Which places of the index they are, where they are some.
     """
 
     xyz: np.ndarray
     targets: np.ndarray
+    places: np.ndarray | None = None
 
     @property
     def are_stretched(self) -> bool:
@@ -75,7 +78,8 @@ def every_point(index: NeighborIndex) -> Queries:
 def every_place(index: NeighborIndex, stretch: np.ndarray | None = None) -> Queries:
     """Ask at every point of an index, with its stretch (3, N) where there is one; the results are in places' order."""
     xyz = index.xyz if stretch is None else np.concatenate([index.xyz, stretch])
-    return Queries(xyz, np.arange(len(index)))
+    places = np.arange(len(index))
+    return Queries(xyz, places, places)
 
 
 def at_places(
@@ -89,7 +93,7 @@ def at_places(
     xyz = index.xyz.take(places, axis=1)
     if stretch is not None:
         xyz = np.concatenate([xyz, stretch.take(places, axis=1)])
-    return Queries(xyz, np.arange(len(places)) if targets is None else targets)
+    return Queries(xyz, np.arange(len(places)) if targets is None else targets, places)
 
 
 def at_points(index: NeighborIndex, points: np.ndarray, stretch: np.ndarray | None = None) -> Queries:
