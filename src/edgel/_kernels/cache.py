@@ -79,17 +79,17 @@ class KernelCache(NullCache):
             found = CompileResult._rebuild(target_context, *compiled)
         except Exception:  # as above: the source is there
             return None
-        self._keep(sig, found, compiled)
+        self._keep(sig, found, lambda: compiled)
         return found
 
     def save_overload(self, sig: Any, cres: Any) -> None:
         """Keep what was compiled, where it can be kept: it runs all the same."""
-        self._keep(sig, cres, cres._reduce())
+        self._keep(sig, cres, cres._reduce)
 
-    def _keep(self, sig: Any, cres: Any, compiled: Any) -> None:
+    def _keep(self, sig: Any, cres: Any, reduce: Callable[[], Any]) -> None:
         try:
             if self._numba.check_cachable(cres):
-                _write(self._path(sig, cres.codegen), self.sealed(compiled))
+                _write(self._path(sig, cres.codegen), self.sealed(reduce()))
         except Exception:
             KernelCache.keeps = False
 
