@@ -17,11 +17,12 @@ import sys
 from collections.abc import Callable, Iterator
 from functools import cache, cached_property
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numba
 import numpy as np
-from numba.core import config
+from numba.core import config, event
 from numba.core.caching import CompileResultCacheImpl, NullCache
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
@@ -29,6 +30,7 @@ from numba.core.serialize import dumps
 from edgel._kernels import forms
 from edgel._kernels.ahead import compiled_elsewhere
 
+FINISHING = "edgel:finish"  # what is told of while a kernel that was brought along is finished, as of one compiled
 _HASH = hashlib.sha256
 _HEAD = 2 * _HASH().digest_size  # bytes of a file before the kernel itself: its stamp, and the checksum
 
@@ -75,7 +77,8 @@ class KernelCache(NullCache):
             if form is None:
                 return None
             (name, bitcode), *others = form
-            compiled = forms.translate(target_context.codegen(), name, bitcode), *others
+            with event.trigger_event(FINISHING, {"dispatcher": SimpleNamespace(py_func=self._function)}):
+                compiled = forms.translate(target_context.codegen(), name, bitcode), *others
             found = CompileResult._rebuild(target_context, *compiled)
         except Exception:  # as above: the source is there
             return None
