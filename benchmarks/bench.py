@@ -80,7 +80,7 @@ def main() -> None:
         slowest = 2.0 if options.quick else speed.SLOWEST
         results["speed"] = speed.normals_of_all_points(sizes, slowest=slowest) + speed.edges(sizes, slowest)
         results["frames"] = speed.frames(1 if options.quick else speed.ROUNDS)
-        results["first_run"] = first_run.run(1 if options.quick else first_run.ROUNDS)
+        results["first_run"] = first_run.run(1, 200) if options.quick else first_run.run()
         results["memory"] = memory.run()
         results["stages"] = speed.stages()
         results["roofline"] = roofline.run(min(sizes[-1], 647_984), 3 if options.quick else 7)

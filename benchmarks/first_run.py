@@ -1,6 +1,8 @@
 """The first minute and the ten-thousandth cloud: from an empty cache of kernels to the first edges, and small clouds.
 
-Run: python benchmarks/first_run.py (part of make bench). Medians of five, CPU seconds of all processes and wall seconds.
+Run: python benchmarks/first_run.py [ROUNDS [CLOUDS]] (part of make bench). Medians of five, CPU seconds of all processes
+and wall seconds. Kernels are compiled from their sources, or brought along where ``python packaging/kernel_forms.py`` has
+been run: the first line says which.
 """
 
 from __future__ import annotations
@@ -20,8 +22,12 @@ from typing import Any
 import numpy as np
 
 import edgel
+from edgel._kernels import forms
 
 ROUNDS = 5
+CLOUDS = 10_000  # small ones, asked for at once
+BROKEN = 1000  # of so many one is too small to be a cloud
+CHECKED = 100  # of so many one is asked for again, alone
 LIST = "import sys, numpy, edgel; edgel.detect(numpy.load(sys.argv[1]))"
 FRAME = """
 import sys, numpy, edgel
@@ -75,9 +81,25 @@ def here(work: Callable[[], Any], repeats: int) -> tuple[float, float]:
     return (time.process_time() - cpu) / repeats, (time.perf_counter() - start) / repeats
 
 
-def run(rounds: int = ROUNDS) -> list[dict[str, Any]]:
+def many(count: int) -> tuple[float, float]:
+    """CPU and wall seconds for each of many small clouds asked for at once; ends where an answer is another than alone."""
+    clouds = [part(2 if seed % BROKEN == BROKEN - 1 else 1024, seed) for seed in range(count)]
+    found: list[edgel.Detections] = []
+    cpu, wall = here(lambda: found.append(edgel.detect_many(clouds)), 1)
+    broken = [number for number, cloud in enumerate(clouds) if len(cloud) == 2]
+    if list(found[0].failures) != broken:
+        raise SystemExit(f"detect_many: {list(found[0].failures)} failed instead of {broken}")
+    for number in range(0, count, CHECKED):
+        together, alone = vars(found[0].edges[number]), vars(edgel.detect(clouds[number]))
+        fields = [name for name, value in alone.items() if isinstance(value, np.ndarray)]
+        if any(not np.array_equal(together[name], alone[name], equal_nan=True) for name in fields):
+            raise SystemExit(f"detect_many: cloud {number} has another answer than alone")
+    return cpu / count, wall / count
+
+
+def run(rounds: int = ROUNDS, clouds: int = CLOUDS) -> list[dict[str, Any]]:
     """Measure all of it, one round after the other."""
-    small = [part(1024, seed) for seed in range(64)]
+    small = part(1024)
     with tempfile.TemporaryDirectory() as folder:
         jobs = {"a part of 36,000 points": (LIST, part(36_000)), "a depth frame, 640 x 480": (FRAME, frame())}
         work: dict[str, Callable[[], tuple[float, float]]] = {}
@@ -86,10 +108,10 @@ def run(rounds: int = ROUNDS) -> list[dict[str, Any]]:
             np.save(path, array)
             work[f"first edges of {name}"] = partial(program, code, str(path))
         work["import edgel"] = partial(program, "import edgel")
-        work["detect, 1,024 points"] = partial(here, lambda: edgel.detect(small[0]), 20)
-        work["detect_many, 64 clouds of 1,024 points"] = partial(here, lambda: edgel.detect_many(small), 1)
-        edgel.detect(small[0])
+        work["detect, 1,024 points"] = partial(here, lambda: edgel.detect(small), 20)
+        edgel.detect(small)
         measured = {name: [once() for _ in range(rounds)] for name, once in work.items()}
+    measured[f"detect_many, each of {clouds:,} such clouds"] = [many(clouds)]
     return [
         {
             "work": name,
@@ -111,4 +133,5 @@ def table(rows: list[dict[str, Any]]) -> str:
 
 
 if __name__ == "__main__":
-    print(table(run(int(sys.argv[1]) if sys.argv[1:] else ROUNDS)))
+    print(f"Kernels {'brought along' if forms.FILE.exists() else 'compiled from their sources'}.\n")
+    print(table(run(*map(int, sys.argv[1:]))))

@@ -105,6 +105,7 @@ def agree() -> None:
 
 def packages() -> None:
     """Wheel and sdist, built from nothing and looked at by four programs."""
+    bring_forms()
     tell("wheel and sdist")
     shutil.rmtree(DIST, ignore_errors=True)
     tool("build", "--outdir", DIST, ROOT)
@@ -115,6 +116,17 @@ def packages() -> None:
     checksum = hashlib.sha256(sdist.read_bytes()).hexdigest()
     recipe = (ROOT / "packaging/recipe.yaml").read_text()
     (DIST / "recipe.yaml").write_text(recipe.replace("sha256: SHA256", f"sha256: {checksum}"))
+
+
+def bring_forms() -> None:
+    """Have the wheel bring along the forms of kernels, for every supported Python that is here, on this platform."""
+    for path in (ROOT / "src/edgel/_kernels").glob("forms-*.zip"):
+        path.unlink()
+    for number, python in interpreters().items():
+        tell(f"Python {number}: forms of kernels")
+        with tempfile.TemporaryDirectory() as folder:
+            programs = environment(Path(folder), python, *PROJECT["dependencies"])
+            print(run(programs / "python", ROOT / "packaging/kernel_forms.py", PYTHONPATH=str(ROOT / "src")), end="")
 
 
 def interpreters() -> dict[str, str]:

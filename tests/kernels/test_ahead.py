@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import threading
 
 import first_jobs
 import numpy as np
@@ -74,6 +75,26 @@ def test_other_processes_compile_what_this_one_has_not_begun(tmp_path, monkeypat
         for path in (tmp_path / "cache").rglob("*.nbc"):
             path.unlink()
     assert "'d'" not in compiled
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+def test_a_child_forked_while_another_thread_looks_finds_nobody_looking():
+    looks, done = threading.Event(), threading.Event()
+
+    def look():
+        with ahead._lock:
+            looks.set()
+            done.wait(0.2)
+
+    other = threading.Thread(target=look)
+    other.start()
+    looks.wait()
+    child = os.fork()
+    if child == 0:
+        os._exit(0 if ahead._lock.acquire(timeout=10) else 1)
+    other.join()
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    assert not ahead._lock.locked()
 
 
 def test_warming_up_compiles_what_is_listed_and_says_where_it_cannot_be_kept(monkeypatch):

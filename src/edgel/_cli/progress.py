@@ -12,10 +12,11 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from edgel._cli.output import print_line, seconds, stderr_console
 from edgel._kernels.ahead import expected_seconds
-from edgel._kernels.cache import KernelCache
+from edgel._kernels.cache import FINISHING, KernelCache
 from edgel.io.errors import printable
 
 COMPILING = "compiling kernels, first run only"
+_TOLD_BY = ("numba:compile", FINISHING)
 
 
 class Watch(event.Listener):
@@ -67,7 +68,8 @@ class Watch(event.Listener):
     def __enter__(self) -> Watch:
         """Begin to watch."""
         # Numba tells of a kernel only when it compiles one: loading it from the disk cache is no event.
-        event.register("numba:compile", self)
+        for each in _TOLD_BY:
+            event.register(each, self)
         if self._bar is not None:
             self._bar.start()
         return self
@@ -76,7 +78,8 @@ class Watch(event.Listener):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Clear the line."""
-        event.unregister("numba:compile", self)
+        for each in _TOLD_BY:
+            event.unregister(each, self)
         if self._bar is not None:
             self._bar.stop()
         if error is None and self._told and not self._quiet and self.compile_seconds > 1:

@@ -27,14 +27,22 @@ from edgel._kernels.threads import num_threads
 
 FILE = "first_jobs.txt"
 MOST = 3  # processes beside this one
+EACH = 1.1  # CPU seconds that a kernel takes to compile, on average
 _KEPT = "kept"
 
 _lock = threading.Lock()
 _begun: dict[str, threading.Event | None] = {}
 """Kernels that are compiled, with what says that another process is done with it; None where it is this process."""
 _started: set[str] = set()
-if hasattr(os, "register_at_fork"):  # in a forked child nobody would say that they are done
-    os.register_at_fork(after_in_child=_begun.clear)
+
+
+def _begin_anew() -> None:
+    _begun.clear()  # in a forked child nobody would say that they are done
+    _lock.release()
+
+
+if hasattr(os, "register_at_fork"):  # held by another thread it would stay locked in the child
+    os.register_at_fork(before=_lock.acquire, after_in_parent=_lock.release, after_in_child=_begin_anew)
 
 
 @cache
@@ -72,8 +80,11 @@ def warm_up(progress: Callable[[int, int], None]) -> None:
 
 
 def expected_seconds() -> float:
-    """Return about how long the kernels of one job take to compile."""
-    return max(len(kernels) for kernels in first_jobs().values()) * 0.5 / (1 + _helpers())
+    """Return about how long the kernels of one job take to compile, beside what else the machine does now."""
+    processes, cores = 1 + _helpers(), os.cpu_count() or 1
+    others = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0  # not on Windows
+    at_once = processes * min(1.0, cores / (processes + others))
+    return max(len(kernels) for kernels in first_jobs().values()) * EACH / at_once
 
 
 def _helpers() -> int:
@@ -99,7 +110,7 @@ def _start(kernels: list[tuple[str, str]]) -> None:
             )
         except OSError:  # no more processes: this one compiles all
             return
-        atexit.register(process.kill)
+        atexit.register(_end, process)
         threading.Thread(target=_feed, args=(process, kernels), name="edgel compiler", daemon=True).start()
 
 
@@ -123,7 +134,11 @@ def _feed(process: subprocess.Popen[str], kernels: list[tuple[str, str]]) -> Non
             finally:
                 done.set()
         process.kill()
-    atexit.unregister(process.kill)
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    process.kill()
+    process.wait()
 
 
 def serve(cache: Any) -> None:

@@ -17,16 +17,20 @@ import sys
 from collections.abc import Callable, Iterator
 from functools import cache, cached_property
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numba
 import numpy as np
-from numba.core import config
+from numba.core import config, event
 from numba.core.caching import CompileResultCacheImpl, NullCache
+from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
+from edgel._kernels import forms
 from edgel._kernels.ahead import compiled_elsewhere
 
+FINISHING = "edgel:finish"  # what is told of while a kernel that was brought along is finished, as of one compiled
 _HASH = hashlib.sha256
 _HEAD = 2 * _HASH().digest_size  # bytes of a file before the kernel itself: its stamp, and the checksum
 
@@ -54,25 +58,58 @@ class KernelCache(NullCache):
         """Return what was compiled for these types, here or meanwhile in another process, None if there is nothing."""
         target_context.refresh()
         found = self._read(sig, target_context)
-        return self._read(sig, target_context) if found is None and compiled_elsewhere(self._function) else found
+        if found is None and compiled_elsewhere(self._function):
+            found = self._read(sig, target_context)
+        return self._translated(sig, target_context) if found is None else found
 
     def _read(self, sig: Any, target_context: Any) -> Any:
         try:
-            content = self._path(sig, target_context.codegen()).read_bytes()
-            if content[:_HEAD] != self._head(content[_HEAD:]):
-                return None
-            return self._numba.rebuild(target_context, pickle.loads(content[_HEAD:]))
+            kept = self.checked(self._path(sig, target_context.codegen()).read_bytes())
+            return None if kept is None else CompileResult._rebuild(target_context, *kept)
         except Exception:  # whatever unpickling raises, classes that have moved included
             return None
 
+    def _translated(self, sig: Any, target_context: Any) -> Any:
+        """Return what LLVM makes of the form that edgel brought along, and keep it; None where there is none of use."""
+        try:
+            brought = forms.read(self.name_of(sig))
+            form = None if brought is None else self.checked(brought)
+            if form is None:
+                return None
+            (name, bitcode), *others = form
+            with event.trigger_event(FINISHING, {"dispatcher": SimpleNamespace(py_func=self._function)}):
+                compiled = forms.translate(target_context.codegen(), name, bitcode), *others
+            found = CompileResult._rebuild(target_context, *compiled)
+        except Exception:  # as above: the source is there
+            return None
+        self._keep(sig, found, lambda: compiled)
+        return found
+
     def save_overload(self, sig: Any, cres: Any) -> None:
         """Keep what was compiled, where it can be kept: it runs all the same."""
+        self._keep(sig, cres, cres._reduce)
+
+    def _keep(self, sig: Any, cres: Any, reduce: Callable[[], Any]) -> None:
         try:
             if self._numba.check_cachable(cres):
-                compiled = dumps(self._numba.reduce(cres))
-                _write(self._path(sig, cres.codegen), self._head(compiled) + compiled)
+                _write(self._path(sig, cres.codegen), self.sealed(reduce()))
         except Exception:
             KernelCache.keeps = False
+
+    def sealed(self, compiled: Any) -> bytes:
+        """Return what was made of this kernel as bytes, with the stamp of all that went into it and a checksum."""
+        content = dumps(compiled)
+        return self._stamp + _HASH(content).digest() + content
+
+    def checked(self, content: bytes) -> Any:
+        """Return what was sealed, None where it was made of something else or is damaged."""
+        head = self._stamp + _HASH(content[_HEAD:]).digest()
+        return pickle.loads(content[_HEAD:]) if content[:_HEAD] == head else None
+
+    def name_of(self, sig: Any) -> str:
+        """Return a name of the kernel for arguments of these types."""
+        function = self._function
+        return f"{function.__module__}.{function.__qualname__}-{_HASH(repr(sig).encode()).hexdigest()[:16]}"
 
     @cached_property
     def _numba(self) -> CompileResultCacheImpl:
@@ -83,9 +120,6 @@ class KernelCache(NullCache):
         ingredients = sorted(set(_ingredients(self._function, set())))
         checked = f"bounds checked: {bool(config.BOUNDSCHECK)}"  # pyright: ignore[reportAttributeAccessIssue]
         return _HASH("\0".join([numba.__version__, checked, *ingredients]).encode()).digest()
-
-    def _head(self, compiled: bytes) -> bytes:
-        return self._stamp + _HASH(compiled).digest()
 
     def _path(self, sig: Any, codegen: Any) -> Path:
         module, name = Path(inspect.getfile(self._function)).stem, self._function.__qualname__

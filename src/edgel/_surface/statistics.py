@@ -77,14 +77,10 @@ def statistics_of(features: np.ndarray, spacing: np.ndarray) -> Statistics:
     """
     if not (features[:, _LARGEST + ROUNDNESS] > _SPANS).any():
         raise ValueError("points: all lie on one line or spot, so there is no surface whose edges could be found")
-    bent, noise, nearest, roundness = (features[:, i] for i in (_LARGEST + VARIATION, VARIATION, _NEAREST, ROUNDNESS))
-    quantiles = [
-        np.quantile(bent, [0.1, 0.5, 0.9]),
-        np.quantile(noise, [0.1, 0.5]),
-        np.quantile(nearest, [0.1, 0.5]),
-        np.quantile(roundness, [0.5]),
-    ]
-    values = (np.round(np.concatenate(quantiles) / STEPS) * STEPS).astype(np.float32)
+    columns = features[:, (_LARGEST + VARIATION, VARIATION, _NEAREST, ROUNDNESS)]
+    bent, noise, nearest, roundness = np.quantile(columns, [0.1, 0.5, 0.9], axis=0).T
+    quantiles = np.array([*bent, *noise[:2], *nearest[:2], roundness[1]])
+    values = (np.round(quantiles / STEPS) * STEPS).astype(np.float32)
     return Statistics(values, float(np.median(spacing[spacing > 0])))
 
 
