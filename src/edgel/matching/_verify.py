@@ -20,7 +20,7 @@ EDGE, SURFACE, THROUGH, MISSING, VISIBLE = range(5)
 """Columns of `confirm`."""
 _EDGES = 1.5  # weight of the edges' share against the surface's
 _MISSING = 0.5  # weight of creases where the other surface is seen to be smooth
-_THROUGH = 3.0  # and of surface that the sensor looked through: a true pose has next to none
+_THROUGH = 5.0  # and of surface that the sensor looked through: a true pose has next to none
 
 
 class Probes(NamedTuple):
