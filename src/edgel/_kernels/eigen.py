@@ -1,4 +1,4 @@
-"""The smallest eigenvalue of symmetric 3 x 3 matrices and its eigenvector, of one and of eight in step; all of larger ones."""
+"""Eigenvalues of symmetric matrices: the smallest of 3 x 3, of one and of eight in step, and all of any size."""
 
 from __future__ import annotations
 

@@ -21,8 +21,8 @@ class Sight(NamedTuple):
     Attributes
     ----------
     near, far : (S, S) float32
-        Ranges, in the cloud's unit, the nearest of a cell and those around it; infinite and 0 where nothing returned, and
-        (1, 1) if no sensor is known.
+        Ranges, in the cloud's unit, the nearest of a cell and those around it; infinite and 0 where nothing returned,
+        and (1, 1) if no sensor is known.
     eye : (3,) float64
         Where the sensor stood.
     """

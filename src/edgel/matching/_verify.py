@@ -19,8 +19,9 @@ OUTLINE = 0.6  # weight of an outline's match: only one face is seen, and where 
 EDGE, SURFACE, THROUGH, MISSING, VISIBLE = range(5)
 """Columns of `confirm`."""
 _EDGES = 1.5  # weight of the edges' share against the surface's
-_MISSING = 0.5  # weight of creases where the other surface is seen to be smooth
-_THROUGH = 5.0  # and of surface that the sensor looked through: a true pose has next to none
+_MISSING = 2.0  # weight of creases where the other surface is seen to be smooth
+_PLAIN = 0.5 * math.pi  # turn of a crease that is not missed by detectors; of flatter ones less is made
+_THROUGH = 6.0  # and of surface that the sensor looked through: a true pose has next to none
 
 
 class Probes(NamedTuple):
@@ -164,7 +165,7 @@ def _confirm(start, stop, poses, probes, field, tolerance, columns):
                 bend = probes.bend[e]  # the normal of the surface itself
                 found, _ = find_surface(field, x, y, z, bend * n0, bend * n1, bend * n2, tolerance)
                 if found >= 0 and field.smooth[found]:
-                    missing += w
+                    missing += w * min(probes.turn[e] / _PLAIN, 1.0)
         surface, through, visible, share = 0.0, 0.0, 0.0, 0.0
         for s in range(len(probes.surface_weights)):
             x, y, z = move(pose, probes.surface[s])
@@ -195,7 +196,7 @@ def confirm(poses: np.ndarray, probes: Probes, field: Field, tolerance: float) -
     (P, 5) float64
         Shares, 0 to 1, by columns: `EDGE` of the edges found, `SURFACE` of the surface found, both by how near;
         `THROUGH` of the surface through which the other sensor looked; `MISSING` of the creases where the other surface
-        is smooth; `VISIBLE` of the surface where the other sensor, if there is one, saw something no nearer.
+        is smooth, flat ones counting less; `VISIBLE` of the surface where the other sensor, if there is one, saw something no nearer.
     """
     columns = np.empty((len(poses), 5))
     run_slices(_confirm, len(poses), np.ascontiguousarray(poses), probes, field, tolerance, columns, size=16)
@@ -205,5 +206,5 @@ def confirm(poses: np.ndarray, probes: Probes, field: Field, tolerance: float) -
 def scores_of(columns: np.ndarray) -> np.ndarray:
     """Weigh what speaks for poses against what speaks against them, (P,): at most 1."""
     for_it = _EDGES * columns[:, EDGE] + columns[:, SURFACE]
-    against = _THROUGH * columns[:, THROUGH] + _EDGES * _MISSING * columns[:, MISSING]
+    against = _THROUGH * columns[:, THROUGH] + _MISSING * columns[:, MISSING]
     return (for_it - against) / (1 + _EDGES)
