@@ -20,7 +20,6 @@ EDGE, SURFACE, THROUGH, MISSING, VISIBLE = range(5)
 """Columns of `confirm`."""
 _EDGES = 1.5  # weight of the edges' share against the surface's
 _MISSING = 2.0  # weight of creases where the other surface is seen to be smooth
-_PLAIN = 0.5 * math.pi  # turn of a crease that is not missed by detectors; of flatter ones less is made
 _THROUGH = 6.0  # and of surface that the sensor looked through: a true pose has next to none
 
 
@@ -165,7 +164,7 @@ def _confirm(start, stop, poses, probes, field, tolerance, columns):
                 bend = probes.bend[e]  # the normal of the surface itself
                 found, _ = find_surface(field, x, y, z, bend * n0, bend * n1, bend * n2, tolerance)
                 if found >= 0 and field.smooth[found]:
-                    missing += w * min(probes.turn[e] / _PLAIN, 1.0)
+                    missing += w
         surface, through, visible, share = 0.0, 0.0, 0.0, 0.0
         for s in range(len(probes.surface_weights)):
             x, y, z = move(pose, probes.surface[s])
@@ -196,7 +195,7 @@ def confirm(poses: np.ndarray, probes: Probes, field: Field, tolerance: float) -
     (P, 5) float64
         Shares, 0 to 1, by columns: `EDGE` of the edges found, `SURFACE` of the surface found, both by how near;
         `THROUGH` of the surface through which the other sensor looked; `MISSING` of the creases where the other surface
-        is smooth, flat ones counting less; `VISIBLE` of the surface where the other sensor, if there is one, saw something no nearer.
+        is smooth; `VISIBLE` of the surface where the other sensor, if there is one, saw something no nearer.
     """
     columns = np.empty((len(poses), 5))
     run_slices(_confirm, len(poses), np.ascontiguousarray(poses), probes, field, tolerance, columns, size=16)
