@@ -78,7 +78,7 @@ def _answer(
     (pose, *_), score = found.poses, float(found.scores[0])
     same, group = same_answers(match, found, swapped, symmetries)
     others = found.scores[~same]
-    margin = _margin(found, max(float(others[0]), 0.0) if len(others) else 0.0)
+    margin = margin_of(found, max(float(others[0]), 0.0) if len(others) else 0.0)
     turned = found.poses if not swapped else np.linalg.inv(found.poses)
     alternatives = Poses(turned[1:], found.scores[1:])
     doubt = _doubt(found, margin)
@@ -140,16 +140,16 @@ def _fitness(found: Found) -> float:
     return float(there[SURFACE] / max(there[VISIBLE], 1e-9))
 
 
-def _agreement(found: Found) -> float:
+def agreement(found: Found) -> float:
     """How far edges speak for the best pose: 1 where none contradict it, 0 where as many do as are found."""
     edge, missing = found.columns[0, 0, [EDGE, MISSING]]
     return float(max(edge - missing, 0) / (edge + missing)) if edge + missing > 0 else 1.0
 
 
-def _margin(found: Found, other: float) -> float:
+def margin_of(found: Found, other: float) -> float:
     """How far the best pose is ahead of another score, in how far is far, as far as its edges agree."""
     score = float(found.scores[0])
-    return _agreement(found) * float(np.clip((score - other) / max(_FAR[0] * score, _FAR[1]), 0, 1))
+    return agreement(found) * float(np.clip((score - other) / max(_FAR[0] * score, _FAR[1]), 0, 1))
 
 
 def _doubt(found: Found, margin: float) -> str:
@@ -159,10 +159,8 @@ def _doubt(found: Found, margin: float) -> str:
         return f"no pose is confirmed: the best lets {fitness:.0%} of the surface lie where it should, half is asked"
     if score < _LEAST_SCORE:
         return f"no pose is confirmed by edges and surface: the best scores {score:.2f}, {_LEAST_SCORE:g} is asked"
-    if (agreement := _agreement(found)) < _LEAST_AGREEMENT:
-        return (
-            f"no pose is confirmed: of the best, creases contradict it nearly as often as they agree ({agreement:.2f})"
-        )
+    if agreement(found) < _LEAST_AGREEMENT:
+        return "no pose is confirmed: creases contradict the best about as often as they confirm it"
     overlap = found.columns[0, 0, SURFACE]
     if overlap < _LEAST_OVERLAP and margin < SURE:
         return f"no pose is confirmed: the best lets {overlap:.0%} of the surface lie on the other, and is not alone"
