@@ -15,7 +15,7 @@ from edgel.matching._verify import EDGE, MISSING, SURFACE, VISIBLE
 
 SURE = 0.1
 """Margin from which on an answer can be relied on: `docs/matching.md` says how often such answers are right."""
-_LEAST_SCORE, _LEAST_FIT, _LEAST_AGREEMENT, _LEAST_OVERLAP = 0.1, 0.5, 0.1, 0.4
+_LEAST_SCORE, _LEAST_FIT, _LEAST_AGREEMENT, _LEAST_OVERLAP = 0.15, 0.5, 0.1, 0.4
 _FAR = (0.5, 0.25)  # of the score, and at least: as far behind as that is out of the question
 _ORDERS = 15.0  # spacings of either cloud that the other has to be large
 _FEWEST_PLACES = 30

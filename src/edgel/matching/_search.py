@@ -20,7 +20,6 @@ _SOURCES, _TARGETS, _VOTERS, _SURFACE = 300, 2400, 64, 250
 _PAIRS = 250_000  # that are tried, by fewer of the source where the target has many
 _MOST = 2000  # half-edges, and places of the surface, that refine
 _PROPOSED, _REFINED, _FINAL = 1500, 80, 12
-_BACK = 1.5  # weight of creases of the other cloud where the source is smooth: most of them lie elsewhere
 REACH, _TIGHT, END = 4.0, 2.0, 1.5
 """Spacings within which matches lie: at first, of a verification, and in the end."""
 
@@ -118,7 +117,7 @@ class Match:
             return Found(poses, np.empty(0), np.empty((0, 2, 5)))
         there = confirm(poses, self.few, self.fine, self.tight)
         back = confirm(np.linalg.inv(poses), *self.back, self.tight)
-        there[:, MISSING] += _BACK * back[:, MISSING]
+        there[:, MISSING] += back[:, MISSING]
         scores = scores_of(there) - back[:, THROUGH]
         found = Found(poses, scores, np.stack([there, back], axis=1)).take(np.argsort(-scores, kind="stable"))
         return found.take(distinct_rows(found.poses, self.whole, self.same))
