@@ -16,6 +16,7 @@ from edgel.matching._verify import EDGE, MISSING, SURFACE, VISIBLE
 SURE = 0.1
 """Margin from which on an answer can be relied on: `docs/matching.md` says how often such answers are right."""
 _LEAST_SCORE, _LEAST_FIT, _LEAST_AGREEMENT, _LEAST_OVERLAP = 0.15, 0.5, 0.1, 0.4
+_LEAST_GIVEN = 0.05  # score of a pose that was given, and not found among others
 _FAR = (0.5, 0.25)  # of the score, and at least: as far behind as that is out of the question
 _ORDERS = 15.0  # spacings of either cloud that the other has to be large
 _FEWEST_PLACES = 30
@@ -81,7 +82,7 @@ def _answer(
     margin = margin_of(found, max(float(others[0]), 0.0) if len(others) else 0.0)
     turned = found.poses if not swapped else np.linalg.inv(found.poses)
     alternatives = Poses(turned[1:], found.scores[1:])
-    doubt = _doubt(found, margin)
+    doubt = _doubt(found, margin, _LEAST_GIVEN if method == "initial" else _LEAST_SCORE)
     if doubt:
         return not_found(doubt, stages.seconds, Poses(turned, found.scores))
     _, information, residuals = match.refined(pose[None], end)
@@ -152,13 +153,13 @@ def margin_of(found: Found, other: float) -> float:
     return agreement(found) * float(np.clip((score - other) / max(_FAR[0] * score, _FAR[1]), 0, 1))
 
 
-def _doubt(found: Found, margin: float) -> str:
+def _doubt(found: Found, margin: float, least: float = _LEAST_SCORE) -> str:
     """Say why the best pose is not believed; empty if it is."""
     score, fitness = float(found.scores[0]), _fitness(found)
     if fitness < _LEAST_FIT:
         return f"no pose is confirmed: the best lets {fitness:.0%} of the surface lie where it should, half is asked"
-    if score < _LEAST_SCORE:
-        return f"no pose is confirmed by edges and surface: the best scores {score:.2f}, {_LEAST_SCORE:g} is asked"
+    if score < least:
+        return f"no pose is confirmed by edges and surface: the best scores {score:.2f}, {least:g} is asked"
     if agreement(found) < _LEAST_AGREEMENT:
         return "no pose is confirmed: creases contradict the best about as often as they confirm it"
     overlap = found.columns[0, 0, SURFACE]
