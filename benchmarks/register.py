@@ -1,15 +1,17 @@
 """Registration: how often the right pose is found, how near, how surely, and at what cost, beside rivals.
 
-Run: make bench-register, or python benchmarks/register.py [--pairs 100] [--noise 0.3 0.5] [--rows "view to view" ...]
-[--no-rivals] [--held 1] [--output register.jsonl]. A pair is right by less than 5 degrees and 5 spacings (`register_pairs`). Times are
-CPU seconds of the whole process, detection included, rivals' ICP included. Rivals have two voxel sizes; that which is right
-more often in a row counts there. What is done already, by an output that is there, is not done again.
+Run: make bench-register, or python benchmarks/register.py [--pairs 100] [--first 0] [--noise 0.3 0.5]
+[--rows "view to view" ...] [--no-rivals] [--held 1] [--output folder]. A pair is right by less than 5 degrees and 5 spacings
+(`register_pairs`). Times are CPU seconds of the whole process, detection included, rivals' ICP included. Rivals have two
+voxel sizes; that which is right more often in a row counts there. Each pair has a file in the output folder; what is there is
+not done again, so rows can be run in pieces, also by several processes, and the tables are of all that is there.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -25,37 +27,36 @@ WITHIN = (5.0, 5.0)
 """Degrees and spacings by which a pose may be off."""
 START = (4.0, 4.0)
 """Degrees and spacings by which refinements begin off."""
+REFINED = 1.0
+"""Spacings within which a refinement ends that is right."""
 WANTED = {"view to view": 0.95, "part to view": 0.95, "planar": 0.92, "clutter": 0.90, "crops": 0.85}
 
-
-def methods(rivals: bool) -> dict[str, Callable[[pairs.Pair], Any]]:
-    """Everything that finds a pose from anywhere, by name."""
-    found: dict[str, Callable[[pairs.Pair], Any]] = {"edgel": lambda pair: edgel.register(pair.source, pair.target)}
-    if rivals:
-        import register_rivals as others
-
-        for name, run in others.GLOBAL.items():
-            for voxel in others.VOXELS:
-                found[f"{name} {voxel:g}"] = lambda pair, run=run, voxel=voxel: run(
-                    pair.source, pair.target, pair.spacing, voxel
-                )
-    return found
+Run = Callable[..., Any]
 
 
-def refinements(rivals: bool) -> dict[str, Callable[[pairs.Pair, np.ndarray], Any]]:
-    """Everything that refines a pose, by name."""
-    found: dict[str, Callable[[pairs.Pair, np.ndarray], Any]] = {
-        "edgel": lambda pair, start: edgel.register(pair.source, pair.target, initial=start)
+def methods(row: str, rivals: bool) -> dict[str, Run]:
+    """Everything that finds a pose from anywhere, or refines one in the row of refinements, by name."""
+    # Refinements have a pose to start from as well.
+    found: dict[str, Run] = {
+        "edgel": lambda pair, *start: edgel.register(pair.source, pair.target, initial=start[0] if start else None)
     }
-    if rivals:
-        import register_rivals as others
+    if not rivals:
+        return found
+    import register_rivals as others
 
+    if row == "refinement":
         found["Open3D point to plane"] = lambda pair, start: others.icp(pair.source, pair.target, pair.spacing, start)
         found["small_gicp"] = lambda pair, start: others.small_gicp(pair.source, pair.target, pair.spacing, start)
+        return found
+    for name, run in others.GLOBAL.items():
+        for voxel in others.VOXELS:
+            found[f"{name} {voxel:g}"] = lambda pair, run=run, voxel=voxel: run(
+                pair.source, pair.target, pair.spacing, voxel
+            )
     return found
 
 
-def measure(pair: pairs.Pair, run: Callable[..., Any], *arguments: Any) -> dict[str, Any]:
+def measure(pair: pairs.Pair, run: Run, *arguments: Any) -> dict[str, Any]:
     """Time a method and say how far off it is."""
     start = time.process_time()
     answer = run(pair, *arguments)
@@ -77,41 +78,37 @@ def start_of(pair: pairs.Pair, number: int) -> np.ndarray:
     return moved
 
 
-def run(options: argparse.Namespace) -> list[dict[str, Any]]:
-    """Measure every pair by every method."""
-    path = Path(options.output)
-    done = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
-    known = {(r["row"], r["noise"], r["number"], r["held"], r["method"], r["kind"]) for r in done}
-    everything, refiners = methods(options.rivals), refinements(options.rivals)
-    warm_up(everything, refiners)
-    with path.open("a") as file:
-        for number in range(options.pairs):
-            for noise in options.noise:
-                for row in options.rows:
-                    todo = [("match", n, f, ()) for n, f in everything.items()]
-                    if row == "view to view":
-                        todo += [("refine", n, f, (number,)) for n, f in refiners.items()]
-                    key = (row, noise, number, options.held)
-                    todo = [one for one in todo if (*key, one[1], one[0]) not in known]
-                    pair = pairs.make(row, noise, number, held=options.held) if todo else None
-                    for kind, name, method, more in todo:
-                        assert pair is not None
-                        arguments = [start_of(pair, n) for n in more]
-                        said = dict(zip(("row", "noise", "number", "held"), key, strict=True))
-                        said |= {"part": pair.part, "method": name, "kind": kind} | measure(pair, method, *arguments)
-                        done.append(said)
-                        file.write(json.dumps(said) + "\n")
-                        file.flush()
-    return done
+def run(options: argparse.Namespace) -> None:
+    """Measure every pair by every method, but what is measured already."""
+    warm = set()
+    options.output.mkdir(parents=True, exist_ok=True)
+    for number in range(options.first, options.pairs):
+        for noise in options.noise:
+            for row in options.rows:
+                name = f"{row.replace(' ', '-')}_{round(100 * noise)}_{number}_{options.held}.json"
+                path = options.output / name
+                known = json.loads(path.read_text()) if path.exists() else []
+                done = {one["method"] for one in known}
+                todo = {n: f for n, f in methods(row, options.rivals).items() if n not in done}
+                for method, one in todo.items():
+                    if (row == "refinement", method) not in warm:  # compile and load before anything is timed
+                        example = pairs.make("view to view", 0.0, 3)
+                        one(example, *([example.pose] if row == "refinement" else []))
+                        warm.add((row == "refinement", method))
+                if not todo:
+                    continue
+                pair = pairs.make(row, noise, number, held=options.held)
+                start = [start_of(pair, number)] if row == "refinement" else []
+                said = {"row": row, "noise": noise, "number": number, "held": options.held, "part": pair.part}
+                known += [said | {"method": n} | measure(pair, one, *start) for n, one in todo.items()]
+                whole = path.with_suffix(f".{os.getpid()}.part")
+                whole.write_text(json.dumps(known))
+                whole.replace(path)
 
 
-def warm_up(everything: dict[str, Any], refiners: dict[str, Any]) -> None:
-    """Compile and load before anything is timed."""
-    pair = pairs.make("view to view", 0.0, 3)
-    for method in everything.values():
-        method(pair)
-    for method in refiners.values():
-        method(pair, pair.pose)
+def read(folder: Path) -> list[dict[str, Any]]:
+    """Return all that is measured."""
+    return [one for path in sorted(folder.glob("*.json")) for one in json.loads(path.read_text())]
 
 
 def is_right(one: dict[str, Any]) -> bool:
@@ -120,50 +117,73 @@ def is_right(one: dict[str, Any]) -> bool:
 
 def tables(done: list[dict[str, Any]]) -> str:
     """Write what was measured as Markdown."""
-    lines = []
-    rows = dict.fromkeys((r["row"], r["noise"]) for r in done)
-    rows |= {("planar", noise): None for _, noise in list(rows)} | {("round", noise): None for _, noise in list(rows)}
-    names = list(dict.fromkeys(r["method"].rpartition(" ")[0] or r["method"] for r in done if r["kind"] == "match"))
-    lines += [
-        "| pairs, noise | pairs | " + " | ".join(names) + " | wanted | 90 % shift, spacings | CPU s |",
-        "|---" * (len(names) + 5) + "|",
+    matches = [r for r in done if r["row"] != "refinement"]
+    names = list(dict.fromkeys(rival_of(r) for r in matches))
+    lines = [
+        "| pairs, noise | pairs | "
+        + " | ".join(names)
+        + " | wanted | 90 % shift, spacings | believed, of them wrong | "
+        f"margin above {SURE:g}, of them wrong | CPU s |",
+        "|---" * (len(names) + 7) + "|",
     ]
-    for row, noise in rows:
-        of_row = [r for r in done if r["kind"] == "match" and r["noise"] == noise and belongs(r, row)]
-        shares, own, others = [], [], {}
-        for name in names:
-            sizes: dict[str, list[dict[str, Any]]] = {}
-            for r in of_row:
-                if (r["method"].rpartition(" ")[0] or r["method"]) == name:
-                    sizes.setdefault(r["method"], []).append(r)
-            best = max(sizes.values(), key=lambda rs: np.mean([is_right(r) for r in rs]), default=[])
-            shares.append(f"{100 * np.mean([is_right(r) for r in best]):.0f} %" if best else "-")
-            own, others = (best, others) if name == "edgel" else (own, others | {name: best})
-        shift = quantile([r["shift"] for r in own if is_right(r)], 0.9)
-        cost = " / ".join(f"{np.mean([r['seconds'] for r in rs]):.2f}" for rs in [own, *others.values()] if rs)
-        wanted = f"{100 * WANTED[row]:.0f} %" if row in WANTED else "best rival"
-        lines.append(f"| {row}, {noise:g} | {len(own)} | {' | '.join(shares)} | {wanted} | {shift:.2f} | {cost} |")
-    own = [r for r in done if r["method"] == "edgel" and r["kind"] == "match"]
+    lines += [line_of(matches, row, noise, names) for noise in noises_of(matches) for row in pairs.ROWS[:-1]]
+    own = [r for r in matches if r["method"] == "edgel"]
     sure = [r for r in own if r["margin"] > SURE]
-    if own:
-        right = np.mean([is_right(r) for r in sure]) if sure else np.nan
+    if sure:
+        right = np.mean([is_right(r) for r in sure])
         lines += [
             "",
-            f"Margin above {SURE:g}: {len(sure) / len(own):.0%} of {len(own)} answers, {right:.1%} of them right.",
+            f"Margin above {SURE:g}: {len(sure) / len(own):.0%} of {len(own)} pairs, {right:.1%} of them right.",
         ]
     lines += [
         "",
-        "| refinement from 4 degrees and 4 spacings | runs | median shift, spacings | within 1 |",
-        "|---" * 4 + "|",
+        f"| refinement from {START[0]:g} degrees and {START[1]:g} h | pairs | median shift, h | within {REFINED:g} h | CPU s |",
+        "|---" * 5 + "|",
     ]
-    for name in dict.fromkeys(r["method"] for r in done if r["kind"] == "refine"):
-        shifts = [r["shift"] for r in done if r["kind"] == "refine" and r["method"] == name]
-        lines.append(f"| {name} | {len(shifts)} | {quantile(shifts, 0.5):.3f} | {np.mean(np.array(shifts) < 1):.0%} |")
+    refined = [r for r in done if r["row"] == "refinement"]
+    for noise in noises_of(refined):
+        for name in dict.fromkeys(r["method"] for r in refined):
+            of = [r for r in refined if r["method"] == name and r["noise"] == noise]
+            shifts = [r["shift"] for r in of]
+            within, cost = np.mean(np.array(shifts) < REFINED), np.mean([r["seconds"] for r in of])
+            lines.append(f"| {name}, {noise:g} | {len(of)} | {quantile(shifts, 0.5):.3f} | {within:.0%} | {cost:.2f} |")
     return "\n".join(lines)
 
 
+def line_of(matches: list[dict[str, Any]], row: str, noise: float, names: list[str]) -> str:
+    """Write a row of the table: every rival on the pairs that it was asked for."""
+    of_row = [r for r in matches if r["noise"] == noise and belongs(r, row)]
+    shares, costs = [], []
+    for name in names:
+        sizes: dict[str, list[dict[str, Any]]] = {}
+        for r in of_row:
+            if rival_of(r) == name:
+                sizes.setdefault(r["method"], []).append(r)
+        best = max(sizes.values(), key=lambda rs: np.mean([is_right(r) for r in rs]), default=[])
+        right = sum(is_right(r) for r in best)
+        shares.append(f"{right / len(best):.0%} ({right} of {len(best)})" if best else "-")
+        costs.append(f"{np.mean([r['seconds'] for r in best]):.2f}" if best else "-")
+    own = [r for r in of_row if r["method"] == "edgel"]
+    shift = quantile([r["shift"] for r in own if is_right(r)], 0.9)
+    believed, sure = [r for r in own if r["found"]], [r for r in own if r["margin"] > SURE]
+    counts = [f"{len(rs)}, {sum(not is_right(r) for r in rs)}" for rs in (believed, sure)]
+    wanted = f"{WANTED[row]:.0%}" if row in WANTED else "best rival"
+    cells = [f"{row}, {noise:g}", str(len(own)), *shares, wanted, f"{shift:.2f}", *counts, " / ".join(costs)]
+    return "| " + " | ".join(cells) + " |"
+
+
+def noises_of(done: list[dict[str, Any]]) -> list[float]:
+    return sorted({r["noise"] for r in done})
+
+
+def rival_of(one: dict[str, Any]) -> str:
+    """Return a method's name without its voxel size."""
+    name, _, last = one["method"].rpartition(" ")
+    return name if name and last.replace(".", "").isdigit() else one["method"]
+
+
 def belongs(one: dict[str, Any], row: str) -> bool:
-    """Whether a pair counts in a row; planar and round are the views and parts of such parts."""
+    """Whether a pair counts in a row; planar and round are the views and parts of such parts, too."""
     kinds = {"planar": pairs.PLANAR, "round": pairs.ROUND}
     if row in kinds:
         return one["part"] in kinds[row] and one["row"] in ("view to view", "part to view", row)
@@ -177,9 +197,12 @@ def quantile(values: list[float], share: float) -> float:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--pairs", type=int, default=100)
+    parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--noise", type=float, nargs="+", default=[0.3, 0.5])
-    parser.add_argument("--rows", nargs="+", default=["view to view", "part to view", "clutter", "crops"])
+    parser.add_argument("--rows", nargs="+", choices=pairs.ROWS, default=pairs.ROWS)
     parser.add_argument("--no-rivals", dest="rivals", action="store_false")
     parser.add_argument("--held", type=int, default=0)
-    parser.add_argument("--output", default=str(Path(__file__).parent / "cache" / "register.jsonl"))
-    print(tables(run(parser.parse_args())))
+    parser.add_argument("--output", type=Path, default=Path(__file__).parent / "cache" / "register")
+    chosen = parser.parse_args()
+    run(chosen)
+    print(tables(read(chosen.output)))

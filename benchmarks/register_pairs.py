@@ -20,9 +20,10 @@ from edgel.synth import Solid, make_solid
 
 PLANAR = ("stepped_block", "cube_fractal", "wedge_fan", "frustum", "bracket", "plate", "chamfered_block")
 ROUND = ("flange", "tee", "elbow", "gear")
-ROWS = ("view to view", "part to view", "clutter", "crops", "planar", "round")
-MIN_OVERLAP = {"view to view": 0.3, "part to view": 0.15, "clutter": 0.25, "crops": 0.3, "planar": 0.3, "round": 0.3}
-"""Least share of the source's points that the target shows too: less is no question of matching."""
+ROWS = ("view to view", "part to view", "clutter", "crops", "planar", "round", "refinement")
+"""Kinds of pairs; those of planar and round parts, and those to be refined, are views."""
+MIN_OVERLAP = {"part to view": 0.15, "clutter": 0.25}
+"""Least share of the source's points that the target shows too, else .3: less is no question of matching."""
 MOST_POINTS = 12_000
 """Of a cloud: spacings follow from it, as a scanner's do from its distance."""
 
@@ -143,7 +144,7 @@ def make(row: str, noise: float, number: int, *, held: int = 0) -> Pair:
     maker = {"part to view": _part_to_view, "clutter": _clutter, "crops": _crops}.get(row, _view_to_view)
     while True:
         source, target, pose, frame = maker(name, h, noise, rng)
-        if overlap(source, target, pose, h) >= MIN_OVERLAP[row]:
+        if overlap(source, target, pose, h) >= MIN_OVERLAP.get(row, 0.3):
             break
     inverse = np.linalg.inv(frame)
     middle = (frame @ np.append((solid.vertices.min(axis=0) + solid.vertices.max(axis=0)) / 2, 1))[:3]

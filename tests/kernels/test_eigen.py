@@ -1,4 +1,4 @@
-"""Eigenpairs of symmetric 3 x 3 matrices, one at a time and eight in step, against LAPACK."""
+"""Eigenpairs of symmetric matrices, 3 x 3 one at a time and eight in step, and of any size, against LAPACK."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numba import njit
 
 from edgel._kernels import simd
-from edgel._kernels.eigen import smallest_eigenpair, smallest_eigenpairs
+from edgel._kernels.eigen import smallest_eigenpair, smallest_eigenpairs, turn_to_axes
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -58,3 +58,15 @@ def test_eigenpairs_are_those_of_lapack(seed, scale, least, middle):
     assert (turn * gap < 1e-12 * size)[apart].all()
     across = np.abs((vector * vectors[:, :, 2]).sum(axis=1))
     assert (across * (size - expected[:, 1]) < 5e-3 * size).all()  # on a line, any direction across it will do
+
+
+@given(SEEDS, st.sampled_from([1, 2, 3, 6]), st.sampled_from([1e-6, 1.0, 1e6]))
+def test_axes_are_those_of_lapack_for_any_rank(seed, rank, scale):
+    half = np.random.default_rng(seed).standard_normal((6, rank))
+    matrix = scale * half @ half.T
+    turned, vectors = matrix.copy(), np.empty((6, 6))
+    alone(turn_to_axes)(turned, vectors)
+    size = np.abs(matrix).max()
+    assert np.allclose(np.sort(np.diag(turned)), np.linalg.eigvalsh(matrix), atol=1e-12 * size)
+    assert np.allclose(vectors.T @ vectors, np.eye(6), atol=1e-12)
+    assert np.allclose(vectors @ np.diag(np.diag(turned)) @ vectors.T, matrix, atol=1e-11 * size)

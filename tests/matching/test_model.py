@@ -7,6 +7,7 @@ import edgel
 from edgel import Cloud, Model, synth
 from edgel.matching._half_edges import of_edges
 from edgel.matching._mesh import creases_of, triangles_of
+from edgel.matching._symmetry import TURNS
 
 SPACING = 1.6
 
@@ -73,7 +74,7 @@ def test_every_instance_is_found_once(block):
     assert np.allclose(shifts, [0, 300], atol=SPACING)
 
 
-@pytest.mark.parametrize(("solid", "count"), [(synth.frustum(), 6), (synth.stepped_block(), 1)])
+@pytest.mark.parametrize(("solid", "count"), [(synth.frustum(), 6), (synth.stepped_block(), 1), (synth.gear(), 32)])
 def test_symmetries_are_named(solid, count):
     symmetries = Model(solid_mesh(solid)).symmetries
     assert len(symmetries) == count
@@ -82,6 +83,12 @@ def test_symmetries_are_named(solid, count):
     for move in symmetries:  # every corner comes to lie on a corner
         moved = corners @ move[:3, :3].T + move[:3, 3]
         assert np.linalg.norm(moved[:, None] - corners[None], axis=2).min(axis=1).max() < 0.02 * solid.size
+
+
+def test_a_cylinder_may_turn_by_any_angle_and_over():
+    symmetries = Model(solid_mesh(synth.cylinder())).symmetries
+    assert len(symmetries) == 2 * TURNS
+    assert np.allclose(np.abs(symmetries[:, 2, 2]), 1, atol=1e-3)
 
 
 def test_symmetries_that_are_given_are_taken():

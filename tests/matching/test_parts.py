@@ -3,9 +3,13 @@
 import numpy as np
 import pytest
 
+from edgel.matching._answer import agreement, margin_of
 from edgel.matching._grid import build_grid, find_cell
 from edgel.matching._half_edges import rareness
 from edgel.matching._open import rotation_of, vector_of
+from edgel.matching._search import Found
+from edgel.matching._sight import build_sight, look
+from edgel.matching._verify import EDGE, MISSING
 
 
 @pytest.mark.parametrize("reach", [0.05, 0.3])
@@ -34,3 +38,38 @@ def test_rotation_vectors_come_back(angle):
     back = vector_of(rotation_of(angle * axis))
     assert np.allclose(rotation_of(back), rotation_of(angle * axis), atol=1e-9)
     assert np.isclose(np.linalg.norm(back), angle, atol=1e-6)
+
+
+def test_a_ray_beside_an_outline_looked_through_nothing():
+    """Where a near surface ends before a far one, a place just inside its end is on it; one well beside it is not."""
+    u, v = (values.ravel() for values in np.meshgrid(np.arange(-40.0, 41), np.arange(-40.0, 41)))
+    rays = np.c_[0.01 * u, 0.01 * v, np.ones(len(u))]
+    ranges = np.where(u <= 0, 100.0, 200.0)
+    sight = build_sight(ranges[:, None] * rays, np.zeros(3))
+    beside, well = 0.004, 0.08
+    for y in np.linspace(-0.3, 0.3, 25):
+        assert look(sight, 100 * beside, 100 * y, 100.0, 1.0) == 0
+        assert look(sight, 100 * well, 100 * y, 100.0, 1.0) == -1
+
+
+def found_with(edge, missing, score):
+    columns = np.zeros((1, 2, 5))
+    columns[0, 0, [EDGE, MISSING]] = edge, missing
+    return Found(np.eye(4)[None], np.array([score]), columns)
+
+
+def test_creases_that_contradict_take_the_margin_away():
+    sure, doubtful, wrong = (found_with(0.4, missing, 0.6) for missing in (0.0, 0.2, 0.4))
+    assert agreement(sure) == 1
+    assert 0 < margin_of(doubtful, 0.2) < margin_of(sure, 0.2)
+    assert margin_of(wrong, 0.2) == 0
+
+
+def test_the_margin_grows_with_what_the_next_pose_lacks():
+    assert margin_of(found_with(0.4, 0.0, 0.6), 0.6) == 0
+    assert margin_of(found_with(0.4, 0.0, 0.6), 0.3) == 1
+    assert margin_of(found_with(0.4, 0.0, 0.1), 0.0) < 0.5  # far ahead of the others is not much where all are poor
+
+
+def test_edges_say_nothing_where_there_are_none():
+    assert agreement(found_with(0.0, 0.0, 0.5)) == 1

@@ -156,6 +156,21 @@ def test_a_slide_along_an_edge_is_said():
     assert np.abs(across @ (answer.T_target_source[:3, 3] - MOVED[:3, 3])).max() < 0.5
 
 
+def test_noise_of_normals_settles_no_slide():
+    """Where a roof lies along itself its ends tell, not what noise tilts its planes."""
+
+    def roof(seed):
+        rng = np.random.default_rng(seed)
+        x, y = rng.uniform(-8, 8, 2500), rng.uniform(-40, 40, 2500)
+        return np.c_[x, y, -np.abs(x)] + 0.3 * rng.standard_normal((2500, 3))
+
+    slides = []
+    for seed in range(0, 6, 2):
+        start = pose(np.eye(3), (0, 2.5, 0))
+        slides.append(edgel.register(roof(seed), roof(seed + 1), initial=start).T_target_source[1, 3])
+    assert np.mean(np.abs(slides)) < 0.4 * 0.85  # spacings
+
+
 def test_what_shares_nothing_is_not_found():
     ball = synth.sample(synth.sphere(), pattern="blue_noise", spacing=1.5).cloud.xyz
     wavy = synth.sample(synth.gear(), pattern="blue_noise", spacing=1.6).cloud.xyz

@@ -1,4 +1,4 @@
-"""The smallest eigenvalue of symmetric 3 x 3 matrices and its eigenvector: of one matrix, and of eight in step."""
+"""Eigenvalues of symmetric matrices: the smallest of 3 x 3, of one and of eight in step, and all of any size."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from edgel._kernels.parallel import part, routine
 from edgel._kernels.simd import larger, root, spread, where
 
 _EQUAL = 1e-7  # of the trace: eigenvalues nearer each other than that are not told apart
+_SWEEPS = 30  # of Jacobi's rotations: far more than are taken
+_SETTLED = 1e-24  # of a matrix's squares: what may be left beside its diagonal
 
 
 @routine
@@ -122,3 +124,38 @@ def smallest_eigenpairs(xx, xy, xz, yy, yz, zz):
     product = minors - smallest * rest
     gap = root(larger(rest * rest - 4.0 * product, zero))
     return smallest * scale, 0.5 * (rest - gap) * scale, x, y, z
+
+
+@routine
+def turn_to_axes(matrix, vectors):
+    """Make a symmetric matrix (K, K) diagonal in place, and write its eigenvectors, the columns of (K, K).
+
+    Jacobi's rotations (Golub and Van Loan 2013, section 8.5); the whole matrix has to be given.
+    """
+    size, total = len(matrix), 0.0
+    for i in range(size):
+        for j in range(size):
+            vectors[i, j] = 1.0 if i == j else 0.0
+            total += matrix[i, j] * matrix[i, j]
+    for _ in range(_SWEEPS):
+        left = 0.0
+        for p in range(size):
+            for q in range(p):
+                left += matrix[p, q] * matrix[p, q]
+                if matrix[p, q] == 0.0:
+                    continue
+                half = (matrix[q, q] - matrix[p, p]) / (2.0 * matrix[p, q])
+                tangent = math.copysign(1.0, half) / (abs(half) + math.sqrt(half * half + 1.0))
+                cosine = 1.0 / math.sqrt(tangent * tangent + 1.0)
+                sine = tangent * cosine
+                for k in range(size):
+                    a, b = matrix[k, p], matrix[k, q]
+                    matrix[k, p], matrix[k, q] = cosine * a - sine * b, sine * a + cosine * b
+                for k in range(size):
+                    a, b = matrix[p, k], matrix[q, k]
+                    matrix[p, k], matrix[q, k] = cosine * a - sine * b, sine * a + cosine * b
+                for k in range(size):
+                    a, b = vectors[k, p], vectors[k, q]
+                    vectors[k, p], vectors[k, q] = cosine * a - sine * b, sine * a + cosine * b
+        if left <= _SETTLED * total:
+            break

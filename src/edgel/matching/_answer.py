@@ -11,12 +11,13 @@ from edgel.matching._refine import middle_of, radius_of
 from edgel.matching._registration import Poses, Registration, not_found
 from edgel.matching._search import END, Found, Match, has_more_edges, search
 from edgel.matching._symmetry import same_answers
-from edgel.matching._verify import EDGE, SURFACE, VISIBLE
+from edgel.matching._verify import EDGE, MISSING, SURFACE, VISIBLE
 
 SURE = 0.1
 """Margin from which on an answer can be relied on: `docs/matching.md` says how often such answers are right."""
-_LEAST_SCORE, _LEAST_FIT = 0.1, 0.5
-_FAR_AHEAD = 0.3  # margin that makes up for a small overlap: views of different parts reach .16, once .62
+_LEAST_SCORE, _LEAST_FIT, _LEAST_AGREEMENT, _LEAST_OVERLAP = 0.15, 0.5, 0.1, 0.4
+_LEAST_GIVEN = 0.05  # score of a pose that was given, and not found among others
+_FAR = (0.5, 0.25)  # of the score, and at least: as far behind as that is out of the question
 _ORDERS = 15.0  # spacings of either cloud that the other has to be large
 _FEWEST_PLACES = 30
 _FEW_EDGES = 24  # half-edges of a search, with fewer of which the surface proposes poses
@@ -78,10 +79,10 @@ def _answer(
     (pose, *_), score = found.poses, float(found.scores[0])
     same, group = same_answers(match, found, swapped, symmetries)
     others = found.scores[~same]
-    margin = 1.0 if not len(others) else float(np.clip((score - others[0]) / max(score, 1e-9), 0, 1))
+    margin = margin_of(found, max(float(others[0]), 0.0) if len(others) else 0.0)
     turned = found.poses if not swapped else np.linalg.inv(found.poses)
     alternatives = Poses(turned[1:], found.scores[1:])
-    doubt = _doubt(found, margin)
+    doubt = _doubt(found, margin, _LEAST_GIVEN if method == "initial" else _LEAST_SCORE)
     if doubt:
         return not_found(doubt, stages.seconds, Poses(turned, found.scores))
     _, information, residuals = match.refined(pose[None], end)
@@ -140,14 +141,28 @@ def _fitness(found: Found) -> float:
     return float(there[SURFACE] / max(there[VISIBLE], 1e-9))
 
 
-def _doubt(found: Found, margin: float) -> str:
+def agreement(found: Found) -> float:
+    """How far edges speak for the best pose: 1 where none contradict it, 0 where as many do as are found."""
+    edge, missing = found.columns[0, 0, [EDGE, MISSING]]
+    return float(max(edge - missing, 0) / (edge + missing)) if edge + missing > 0 else 1.0
+
+
+def margin_of(found: Found, other: float) -> float:
+    """How far the best pose is ahead of another score, in how far is far, as far as its edges agree."""
+    score = float(found.scores[0])
+    return agreement(found) * float(np.clip((score - other) / max(_FAR[0] * score, _FAR[1]), 0, 1))
+
+
+def _doubt(found: Found, margin: float, least: float = _LEAST_SCORE) -> str:
     """Say why the best pose is not believed; empty if it is."""
     score, fitness = float(found.scores[0]), _fitness(found)
     if fitness < _LEAST_FIT:
         return f"no pose is confirmed: the best lets {fitness:.0%} of the surface lie where it should, half is asked"
-    if score < _LEAST_SCORE:
-        return f"no pose is confirmed by edges and surface: the best scores {score:.2f}, {_LEAST_SCORE:g} is asked"
+    if score < least:
+        return f"no pose is confirmed by edges and surface: the best scores {score:.2f}, {least:g} is asked"
+    if agreement(found) < _LEAST_AGREEMENT:
+        return "no pose is confirmed: creases contradict the best about as often as they confirm it"
     overlap = found.columns[0, 0, SURFACE]
-    if overlap < _LEAST_FIT and margin < _FAR_AHEAD:
+    if overlap < _LEAST_OVERLAP and margin < SURE:
         return f"no pose is confirmed: the best lets {overlap:.0%} of the surface lie on the other, and is not alone"
     return ""

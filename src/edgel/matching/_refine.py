@@ -7,12 +7,14 @@ import math
 import numpy as np
 
 from edgel._kernels.cholesky import explain, factorize, solve
+from edgel._kernels.eigen import turn_to_axes
 from edgel._kernels.parallel import kernel, routine, run_slices
 from edgel.matching._verify import Field, Probes, find_edge, find_surface, move, turned_by
 
 _SHRINK = 0.75  # of the reach, from step to step
 _ROBUST = 0.5  # of the reach: residuals at which a match counts a quarter (Geman and McClure)
 _LIGHT = 20.0  # plane points that all edges together weigh as in the end: an edge is off along its whole length alike
+_NORMAL_NOISE = 0.06  # radians by which normals are off: so much of a plane tells of directions that it leaves free
 _DAMPING = 1e-4  # of the mean weight, so that what nothing settles stays as it is
 _SETTLED = 1e-5  # of the reach: a step that moves less is the last
 
@@ -63,13 +65,42 @@ def _equations(pose, probes, field, centre, radius, reach, light, information, s
         _add(planes, right, field.normals[found], offset, away, radius, w)
         sums[0] += w
         sums[1] += w * away * away
-    share = min(1.0, _LIGHT / max(sums[2], 1e-9)) if light else 1.0
+    share = 1.0
+    if light:
+        share = min(1.0, _LIGHT / max(sums[2], 1e-9))
+        _without_noise(planes, right, _NORMAL_NOISE * _NORMAL_NOISE * sums[0])
     for i in range(6):
         right[i] += share * edges_right[i]
         for j in range(i + 1):
             edges[i, j] *= share
             matrix[i, j] = planes[i, j] + edges[i, j]
         matrix[i, i] += _DAMPING * (sums[0] + share * sums[2])
+
+
+@routine
+def _without_noise(planes, right, noise):
+    """Take what the noise of normals adds to each axis of the planes' information (6, 6) out of it, in place.
+
+    The normals of a long bar's sides, each off a little, would settle where it lies along itself; its ends' edges know.
+    """
+    values, vectors = np.empty((6, 6)), np.empty((6, 6))
+    for i in range(6):
+        for j in range(i + 1):
+            values[i, j] = values[j, i] = planes[i, j]
+    turn_to_axes(values, vectors)
+    old = right.copy()
+    planes[:], right[:] = 0.0, 0.0
+    for axis in range(6):
+        told = max(values[axis, axis] - noise, 0.0)
+        if told == 0.0:
+            continue
+        along = 0.0
+        for i in range(6):
+            along += vectors[i, axis] * old[i]
+        for i in range(6):
+            right[i] += vectors[i, axis] * along * told / values[axis, axis]
+            for j in range(i + 1):
+                planes[i, j] += vectors[i, axis] * told * vectors[j, axis]
 
 
 @routine

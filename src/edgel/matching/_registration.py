@@ -50,9 +50,10 @@ class Registration:
         Root of the mean squared distance of the source's surface from the target's where they lie on each other, in the
         cloud's unit.
     margin : float
-        How far the best pose is ahead of the next that is no other name for it: 0 they are as good, 1 there is no
-        other; NaN where no other was looked for. Poses that differ by a symmetry are one, those along a free direction
-        are not.
+        How far the best pose is ahead of the next that is no other name for it: 0 they are as good, 1 the next scores
+        half of it or less; times how far edges agree: 0 where creases contradict the pose as often as they confirm it.
+        NaN where no other was looked for. Poses that differ by a symmetry are one, those along a free direction are
+        not.
     alternatives : Poses
         The other poses that were verified.
     symmetries : (S, 4, 4) float64

@@ -34,7 +34,8 @@ class Found:
         T_target_source.
     scores : (P,) float64
     columns : (P, 2, 5) float64
-        See `edgel.matching._verify.confirm`: the source looked for in the target, and the other way round.
+        See `edgel.matching._verify.confirm`: the source looked for in the target, and the other way round; the former's
+        `MISSING` counts those of both.
     """
 
     poses: np.ndarray
@@ -116,7 +117,8 @@ class Match:
             return Found(poses, np.empty(0), np.empty((0, 2, 5)))
         there = confirm(poses, self.few, self.fine, self.tight)
         back = confirm(np.linalg.inv(poses), *self.back, self.tight)
-        scores = scores_of(there) - back[:, THROUGH] - 0.5 * back[:, MISSING]
+        there[:, MISSING] += back[:, MISSING]
+        scores = scores_of(there) - back[:, THROUGH]
         found = Found(poses, scores, np.stack([there, back], axis=1)).take(np.argsort(-scores, kind="stable"))
         return found.take(distinct_rows(found.poses, self.whole, self.same))
 

@@ -21,7 +21,8 @@ class Sight(NamedTuple):
     Attributes
     ----------
     near, far : (S, S) float32
-        Ranges, in the cloud's unit; infinite and 0 where nothing returned, and (1, 1) if no sensor is known.
+        Ranges, in the cloud's unit, the nearest of a cell and those around it; infinite and 0 where nothing returned,
+        and (1, 1) if no sensor is known.
     eye : (3,) float64
         Where the sensor stood.
     """
@@ -65,10 +66,13 @@ def _pixel(side, x, y, z):
 
 @kernel
 def _note(directions, ranges, near, far):
+    last = near.shape[0] - 1
     for p in range(len(ranges)):
         row, column = _pixel(near.shape[0], directions[p, 0], directions[p, 1], directions[p, 2])
-        near[row, column] = min(near[row, column], ranges[p])
         far[row, column] = max(far[row, column], ranges[p])
+        for r in range(max(row - 1, 0), min(row + 1, last) + 1):  # a ray beside an outline may have passed it
+            for c in range(max(column - 1, 0), min(column + 1, last) + 1):
+                near[r, c] = min(near[r, c], ranges[p])
 
 
 @kernel
@@ -82,7 +86,7 @@ def look(sight, x, y, z, tolerance):
     if away == 0.0:
         return 2
     row, column = _pixel(sight.near.shape[0], dx, dy, dz)
-    if not np.isfinite(sight.near[row, column]):
+    if sight.far[row, column] == 0.0:
         return 2
     if away < sight.near[row, column] - tolerance:
         return -1

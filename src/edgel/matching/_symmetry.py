@@ -12,11 +12,13 @@ from edgel.matching._verify import EDGE, MISSING, SURFACE, confirm
 TURNS = 72
 """Turns that stand for any about an axis."""
 _FINE = 150.0  # of the size: spacing at which a part is matched with itself
-_EXACT, _SCANNED = (0.97, 0.93, 0.01), (0.9, 0.7, 0.03)
+_EXACT, _SCANNED = (0.85, 0.98, 0.01), (0.9, 0.7, 0.03)
 """Least shares of surface and edges that a symmetry leaves in place, over those that no move leaves, and most share of
-the creases that it takes to where the surface is smooth; of a model and of a scan."""
+the creases that it takes to where the surface is smooth; of a model, whose edges are exact, while places of its surface
+may find none beside them, and of a scan."""
+_EXACT_SURFACE = 0.97  # of a model without edges
 _MOST = 60  # symmetries that are looked for
-_ROUND = 30  # and from how many on it is any turn about an axis
+_ROUND = 48  # and from how many on it is any turn about an axis
 _TRIED = 1000  # products of symmetries that are tried at a time
 _RIVAL = 0.5  # of the best score, from where on it is asked whether an alternative is the same by symmetry
 
@@ -86,6 +88,8 @@ def _leave(match: Match, moves: np.ndarray) -> np.ndarray:
     surfaces, edges, missing = _EXACT if match.source.spacing == 0 else _SCANNED
     columns = confirm(np.concatenate([np.eye(4)[None], moves]), match.few, match.fine, match.tight)
     still, columns = columns[0], columns[1:]
+    if match.source.spacing == 0 and still[EDGE] == 0:
+        surfaces = _EXACT_SURFACE
     kept = (columns[:, SURFACE] >= surfaces * still[SURFACE]) & (columns[:, EDGE] >= edges * still[EDGE])
     return kept & (columns[:, MISSING] <= still[MISSING] + missing)
 

@@ -19,8 +19,8 @@ OUTLINE = 0.6  # weight of an outline's match: only one face is seen, and where 
 EDGE, SURFACE, THROUGH, MISSING, VISIBLE = range(5)
 """Columns of `confirm`."""
 _EDGES = 1.5  # weight of the edges' share against the surface's
-_MISSING = 0.5  # weight of creases where the other surface is seen to be smooth
-_THROUGH = 3.0  # and of surface that the sensor looked through: a true pose has next to none
+_MISSING = 2.0  # weight of creases where the other surface is seen to be smooth
+_THROUGH = 6.0  # and of surface that the sensor looked through: a true pose has next to none
 
 
 class Probes(NamedTuple):
@@ -205,5 +205,5 @@ def confirm(poses: np.ndarray, probes: Probes, field: Field, tolerance: float) -
 def scores_of(columns: np.ndarray) -> np.ndarray:
     """Weigh what speaks for poses against what speaks against them, (P,): at most 1."""
     for_it = _EDGES * columns[:, EDGE] + columns[:, SURFACE]
-    against = _THROUGH * columns[:, THROUGH] + _EDGES * _MISSING * columns[:, MISSING]
+    against = _THROUGH * columns[:, THROUGH] + _MISSING * columns[:, MISSING]
     return (for_it - against) / (1 + _EDGES)
