@@ -28,6 +28,7 @@ from edgel._kernels.threads import num_threads
 FILE = "first_jobs.txt"
 MOST = 3  # processes beside this one
 _KEPT = "kept"
+_SECONDS = 1.1  # of one core for a kernel, on average: 31 for those of a list of points
 
 _lock = threading.Lock()
 _begun: dict[str, threading.Event | None] = {}
@@ -73,7 +74,7 @@ def warm_up(progress: Callable[[int, int], None]) -> None:
 
 def expected_seconds() -> float:
     """Return about how long the kernels of one job take to compile."""
-    return max(len(kernels) for kernels in first_jobs().values()) * 0.5 / (1 + _helpers())
+    return max(len(kernels) for kernels in first_jobs().values()) * _SECONDS / (1 + _helpers())
 
 
 def _helpers() -> int:
