@@ -38,9 +38,9 @@ REMARKS = {
     "of depth steps, and the end of the ground about the car; few creases. For the paper every pixel beside a ring is an edge.",
     "roofs": "About a thousand points a roof. The default finds most of the eaves and parts of the ridges, with gaps. "
     "The paper's image is 8 pixels wide.",
-    "scan_vs_mesh": "The scans (`.npy`) have noise of one spacing: what the default finds is scattered at random, the paper "
-    "finds broad bands at the silhouette. The meshes (`.ply`) are vertices of large triangles, no scans: "
-    "nearly all are called edges.",
+    "scan_vs_mesh": "The scans (`.npy`) have noise of one spacing: the default follows the rims of the first with gaps, and scatters "
+    "creases over all of the second; the paper finds broad bands at the silhouette. The meshes (`.ply`) are vertices of large "
+    "triangles, no scans: what is called an edge there means nothing.",
     "structured_light": "The paper's kind of sensor. The default follows the outlines of the parts in the bin, both sides of each "
     "step in depth, the screw heads, and the ragged ends of the surface where the sensor saw nothing; few "
     "false creases. The paper finds the outlines as bands, and with them every hole.",
@@ -90,7 +90,7 @@ def clouds(data: Path) -> list[Path]:
 
 @dataclass(frozen=True)
 class Run:
-    """What a method finds in a cloud, in how many seconds, or why it cannot look at it."""
+    """What a method finds in a cloud, in how many seconds of processor time, or why it cannot look at it."""
 
     edges: edgel.Edges | None
     seconds: float
@@ -103,12 +103,12 @@ class Run:
 
 
 def run(detect: Callable[[edgel.Cloud], edgel.Edges], cloud: edgel.Cloud) -> Run:
-    start = time.perf_counter()
+    start = time.process_time()
     try:
         edges = detect(cloud)
     except ValueError as error:
         return Run(None, 0.0, str(error))
-    return Run(edges, time.perf_counter() - start)
+    return Run(edges, time.process_time() - start)
 
 
 def picture(cloud: edgel.Cloud, found: list[edgel.Edges | None], path: Path) -> None:
@@ -165,7 +165,7 @@ def main() -> None:
         INTRO
         + head
         + "\n".join(table)
-        + "\n\nTimes are single warm runs on 2 shared cores.\n\n"
+        + "\n\nTimes are those of the processor, of single warm runs on one thread (`EDGEL_NUM_THREADS=1`).\n\n"
         + "\n".join([of_frames(), *pages])
     )
     (DOCS / "real-data.md").write_text(text)

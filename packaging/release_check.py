@@ -14,10 +14,12 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import time
+import threading
 import tomllib
+import urllib.error
 import urllib.request
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import yaml
@@ -35,6 +37,7 @@ SCHEMAS = {
 }
 LEAST_RATING = 8  # of pyroma's 10: for the rest it asks for an address of electronic mail, of which there is none
 SERVED = 60.0  # seconds that the viewer may take to answer
+ANSWERED = 20.0  # seconds that a server may take to answer
 
 
 def tell(what: str) -> None:
@@ -101,6 +104,37 @@ def agree() -> None:
         raise SystemExit("\n".join(wrong))
     for schema, pattern in SCHEMAS.items():
         tool("check_jsonschema", "--builtin-schema", f"vendor.{schema}", *sorted(ROOT.glob(pattern)))
+
+
+def links() -> None:
+    """Links of the pages to other places: one that leads nowhere ends it, those that nobody answered for are named."""
+    tell("links to other places")
+    found: dict[str, Path] = {}
+    for path in (*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")):
+        for url in re.findall(r"https://[^\s)\]>\"'`]+", path.read_text()):
+            found.setdefault(url.rstrip(".,;"), path)
+    # Of the project's own some only exist once it is released.
+    others = [url for url in found if not url.startswith(tuple(PROJECT["urls"].values()))]
+    with ThreadPoolExecutor(8) as pool:
+        answers = dict(zip(others, pool.map(status, others), strict=True))
+    gone = [f"{found[url].relative_to(ROOT)}: {url} is gone" for url, code in answers.items() if code in (404, 410)]
+    if gone:
+        raise SystemExit("\n".join(gone))
+    unknown = [f"   {url}: {code or 'no answer'}" for url, code in answers.items() if code != 200]
+    print(f"   {len(others) - len(unknown)} of {len(others)} lead somewhere; without an answer, so not checked:")
+    print(*unknown or ["   none"], sep="\n")
+
+
+def status(url: str) -> int | None:
+    """What the server answers to a request for a page, None if nothing does."""
+    request = urllib.request.Request(url, headers={"User-Agent": "Mozilla/5.0 (edgel, release_check.py)"})
+    try:
+        with urllib.request.urlopen(request, timeout=ANSWERED) as page:
+            return page.status
+    except urllib.error.HTTPError as error:
+        return error.code
+    except OSError:
+        return None
 
 
 def packages() -> None:
@@ -174,17 +208,17 @@ def serve(program: Path, folder: Path) -> None:
     words = [program, "view", "demo/tee.ply", "--no-browser"]
     with subprocess.Popen(words, cwd=folder, text=True, stdout=-1, stderr=subprocess.STDOUT) as viewer:
         assert viewer.stdout
+        late = threading.Timer(SERVED, viewer.terminate)  # which ends its output, and the wait for a line of it
+        late.start()
         try:
-            begin = time.monotonic()
             for line in viewer.stdout:
                 if found := re.search(r"http://\S+/", line):
                     with urllib.request.urlopen(found[0], timeout=SERVED) as page:
                         assert page.status == 200
                     return
-                if time.monotonic() - begin > SERVED:
-                    break
             raise SystemExit("the viewer gave no address")
         finally:
+            late.cancel()
             viewer.terminate()
 
 
@@ -248,6 +282,7 @@ def notebooks() -> None:
 
 STEPS: dict[str, Callable[[], None]] = {
     "agree": agree,
+    "links": links,
     "packages": packages,
     "bare": bare,
     "pages": pages,

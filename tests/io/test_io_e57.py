@@ -116,9 +116,9 @@ def test_what_it_cannot_hold(tmp_path):
 
 def test_without_pye57(tmp_path, monkeypatch, folder):
     monkeypatch.setitem(sys.modules, "pye57", None)
-    with pytest.raises(FormatError, match=r"pip install edgel\[e57\]"):
+    with pytest.raises(FormatError, match=r"pip install 'edgel\[e57\]'"):
         read(folder / "empty.e57")
-    with pytest.raises(FormatError, match=r"pip install edgel\[e57\]"):
+    with pytest.raises(FormatError, match=r"pip install 'edgel\[e57\]'"):
         write(tmp_path / "a.e57", Cloud(np.eye(3)))
 
 

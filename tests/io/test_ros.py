@@ -205,6 +205,10 @@ def test_what_cannot_be_read_says_why(tmp_path):
     edgel.write(tmp_path / "a.ply", edgel.Cloud(np.eye(3)))
     with pytest.raises(ValueError, match=r"topic: .*a.ply is no ROS recording"):
         edgel.read(tmp_path / "a.ply", topic="/a")
+    head = b"".join(len(text).to_bytes(4, "little") + text for text in (b"ros1", b"someone"))
+    (tmp_path / "one.mcap").write_bytes(b"\x89MCAP0\r\n\x01" + len(head).to_bytes(8, "little") + head)
+    with pytest.raises(FormatError, match=r"one.mcap: .* not of ROS 2; give the .bag"):
+        edgel.read(tmp_path / "one.mcap")
 
 
 def what_is_said(path):

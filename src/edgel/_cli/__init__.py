@@ -30,7 +30,8 @@ Examples:
   edgel demo
 
 Reads PLY, PCD, LAS/LAZ, E57, XYZ/TXT/CSV/ASC/PTS, PTX, NPY/NPZ, BIN (KITTI, nuScenes), OBJ of points, depth images
-(PNG, TIFF, NPY), and samples meshes (PLY, OBJ, STL, OFF); writes PLY, PCD, LAS/LAZ, E57, texts and NPY/NPZ.
+(PNG, TIFF, NPY), ROS recordings (MCAP, BAG, DB3), and samples meshes (PLY, OBJ, STL, OFF); writes PLY, PCD, LAS/LAZ,
+E57, texts and NPY/NPZ.
 """
 _EPILOG = (
     "Exit codes of every command: 0 done, 1 an error inside edgel, 2 wrong usage, 3 the input cannot be read, 4 its "

@@ -68,7 +68,7 @@ def view(
         try:
             from edgel._viewer.server import serve  # not at the top: viser takes time to import
         except ImportError as error:
-            remedy = "install it with: pip install edgel[view]"
+            remedy = "install it with: pip install 'edgel[view]'"
             raise Failure(ExitCode.USAGE, f"the viewer needs viser, which is not there ({error}); {remedy}") from error
         if port is not None and not 0 < port < 65536:
             raise Failure(ExitCode.USAGE, f"--port: expected 1 to 65535, got {port}")

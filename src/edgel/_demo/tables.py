@@ -68,14 +68,17 @@ def time_table(measurements: Sequence[Measurement]) -> Table:
             "index (s)": one.times.index,
             "plane fits, all points (s)": one.times.all_fits,
             "plane fits, edge points (s)": one.times.edge_fits,
-            "projection, Canny, back-projection (s)": one.times.image,
+            "image (s)": one.times.image,
             "share of plane fits alone": one.times.share_of_fits,
-            "share with projection and Canny": one.times.share_with_image,
+            "share with image": one.times.share_with_image,
         }
         for one in measurements
     ]
     formats = {name: ".1%" if name.startswith("share") else ".3f" for name in rows[0] if name != "part"}
-    note = "The index is the sorting of all points for the neighbour search; plane fits are with that search."
+    note = (
+        "The index is the sorting of all points for the neighbour search; plane fits are with that search. Image: "
+        "projection, Canny and back-projection."
+    )
     return Table("Where the time goes", rows, formats, note)
 
 

@@ -23,11 +23,12 @@ import numpy as np
 from numba.core import types
 from numba.np.numpy_support import as_dtype, from_dtype
 
+from edgel._kernels import forms
 from edgel._kernels.threads import num_threads
 
 FILE = "first_jobs.txt"
 MOST = 3  # processes beside this one
-EACH = 1.1  # CPU seconds that a kernel takes to compile, on average
+EACH, EACH_BROUGHT = 1.1, 0.25  # CPU seconds that a kernel takes, on average: compiled, and finished from its form
 _KEPT = "kept"
 
 _lock = threading.Lock()
@@ -84,7 +85,8 @@ def expected_seconds() -> float:
     processes, cores = 1 + _helpers(), os.cpu_count() or 1
     others = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0  # not on Windows
     at_once = processes * min(1.0, cores / (processes + others))
-    return max(len(kernels) for kernels in first_jobs().values()) * EACH / at_once
+    each = EACH_BROUGHT if forms.FILE.exists() else EACH
+    return max(len(kernels) for kernels in first_jobs().values()) * each / at_once
 
 
 def _helpers() -> int:

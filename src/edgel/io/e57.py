@@ -1,4 +1,4 @@
-"""E57 by pye57 (``pip install edgel[e57]``): all scans of a file in one frame."""
+"""E57 by pye57 (``pip install 'edgel[e57]'``): all scans of a file in one frame."""
 
 from __future__ import annotations
 

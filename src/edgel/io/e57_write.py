@@ -37,7 +37,7 @@ def library(path: object) -> ModuleType:
         from pye57 import libe57  # pyright: ignore[reportAttributeAccessIssue]
     except ImportError as error:
         raise FormatError(
-            f"{path}: E57 files need the package pye57 ({error}); install it with `pip install edgel[e57]`"
+            f"{path}: E57 files need the package pye57 ({error}); install it with `pip install 'edgel[e57]'`"
         ) from None
     return libe57
 

@@ -1,4 +1,4 @@
-"""Points on the surface of a mesh (PLY, OBJ, STL, OFF), by trimesh (``pip install edgel[mesh]``)."""
+"""Points on the surface of a mesh (PLY, OBJ, STL, OFF), by trimesh (``pip install 'edgel[mesh]'``)."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def load(path: str | os.PathLike[str]) -> Any:
     try:
         import trimesh
     except ImportError as error:
-        raise FormatError(f"{name}: meshes need trimesh; install it with `pip install edgel[mesh]`") from error
+        raise FormatError(f"{name}: meshes need trimesh; install it with `pip install 'edgel[mesh]'`") from error
     try:
         with reading(path) as file:
             # Neither materials nor merged vertices are of use here, nor is any other file that it names read.

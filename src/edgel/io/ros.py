@@ -1,4 +1,4 @@
-"""ROS recordings by rosbags (``pip install edgel[ros]``), without ROS: MCAP, rosbag 2 and rosbag 1.
+"""ROS recordings by rosbags (``pip install 'edgel[ros]'``), without ROS: MCAP, rosbag 2 and rosbag 1.
 
 A recording holds many clouds: the messages of topics of `sensor_msgs/PointCloud2`, and of depth images
 (`sensor_msgs/Image`, 16UC1, mono16 or 32FC1) beside whose topic a `camera_info` was recorded.
@@ -28,6 +28,8 @@ _DEPTHS = {"16UC1": "u2", "mono16": "u2", "32FC1": "f4"}
 """Encodings of depth images: counts of a millimetre, or metres (REP 118)."""
 _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 """Numbers of sensor_msgs/PointField."""
+_PLAIN = {"Profile is not ros2.": "an MCAP that is not of ROS 2; give the .bag that it was made from"}
+"""What rosbags says, as its user would."""
 
 
 def topics(path: str | os.PathLike[str]) -> dict[str, int]:
@@ -144,7 +146,7 @@ def _refusing(name: str) -> Iterator[None]:
     except (FormatError, PermissionError):
         raise
     except Exception as error:  # also MemoryError: a damaged length asks for more than there is
-        said = printable(str(error), 200) or type(error).__name__
+        said = _PLAIN.get(str(error)) or printable(str(error), 200) or type(error).__name__
         raise FormatError(f"{name}: cannot be read as a ROS recording: {said}") from error
 
 

@@ -32,7 +32,7 @@ class Model:
     ----------
     part : path, or (vertices, triangles), or an object that carries `vertices` and `faces`
         A closed mesh, its triangles counterclockwise seen from outside, in the unit of the scenes. Files: STL, PLY, OBJ
-        or OFF (``pip install edgel[mesh]``), STEP (``pip install edgel[step]``; its unit is the millimetre).
+        or OFF (``pip install 'edgel[mesh]'``), STEP (``pip install 'edgel[step]'``; its unit is the millimetre).
     scale : float
         By which lengths are multiplied: .001 takes millimetres to scenes in metres.
     symmetries : (S, 4, 4) array_like, optional

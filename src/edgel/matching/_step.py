@@ -1,4 +1,4 @@
-"""STEP files as parts, by build123d (``pip install edgel[step]``): triangles of each face, with its true normals."""
+"""STEP files as parts, by build123d (``pip install 'edgel[step]'``): triangles of each face, with its true normals."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def read_step(name: str) -> tuple[np.ndarray, np.ndarray]:
     try:
         cad: Any = import_module("build123d")
     except ImportError as error:
-        raise FormatError(f"{name}: STEP needs build123d; install it with `pip install edgel[step]`") from error
+        raise FormatError(f"{name}: STEP needs build123d; install it with `pip install 'edgel[step]'`") from error
     try:
         shape = cad.import_step(name)
         faces, size = shape.faces(), shape.bounding_box().diagonal

@@ -104,7 +104,7 @@ def start(workers: int, scheduler: str | None, progress: Callable[[str], None]) 
         from distributed import Client, LocalCluster
     except ImportError as error:
         raise ModuleNotFoundError(
-            "several workers need Dask distributed: pip install edgel[tiles], or use one worker", name="distributed"
+            "several workers need Dask distributed: pip install 'edgel[tiles]', or use one worker", name="distributed"
         ) from error
     config.set({"distributed.scheduler.allowed-failures": _PATIENCE})
     if scheduler is not None:
