@@ -1,14 +1,13 @@
 """Kernels compiled ahead: the list is that of the first jobs, and other processes compile what it names."""
 
 import os
-import subprocess
-import sys
 import threading
 
 import first_jobs
 import numpy as np
 import pytest
 from numba import typeof
+from programs import LISTEN, said_by
 from typer.testing import CliRunner
 
 from edgel._cli import app
@@ -17,22 +16,17 @@ from edgel._kernels import ahead
 from edgel._kernels.cache import KernelCache
 from edgel._surface.forest import load_forests
 
-PROGRAM = """
-import inspect, sys, time
-from numba.core import event
+PROGRAM = f"""
+import time
 from edgel._kernels import ahead
 names = ["a", "b", "c", "d"]
-ahead.first_jobs = lambda: {"job": {f"work:{name}": "f8[1]" for name in names}}
+ahead.first_jobs = lambda: {{"job": {{f"work:{{name}}": "f8[1]" for name in names}}}}
 import numpy as np, work
-class Listener(event.Listener):
-    compiled = []
-    def on_start(self, event): self.compiled.append(event.data["dispatcher"].py_func.__name__)
-    def on_end(self, event): pass
-event.register("numba:compile", listener := Listener())
+{LISTEN}
 work.a(np.ones(3))
 while len(ahead._begun) < len(names):
     time.sleep(0.01)
-print([getattr(work, name)(np.ones(3)) for name in names], listener.compiled)
+print([getattr(work, name)(np.ones(3)) for name in names], compiled)
 """
 
 
@@ -58,17 +52,7 @@ def test_other_processes_compile_what_this_one_has_not_begun(tmp_path, monkeypat
     for threads, own in ("1", "['a', 'b', 'c', 'd']"), ("2", "['a"):
         monkeypatch.setenv("EDGEL_NUM_THREADS", threads)
         program = PROGRAM if threads == "2" else PROGRAM.replace("while len", "while False and len")
-        done = subprocess.run(
-            [sys.executable, "-B", "-c", program],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            timeout=120,
-            check=False,
-        )
-        assert done.returncode == 0, done.stderr
-        assert done.stderr == ""
-        answers, compiled = done.stdout.split("] ")
+        answers, compiled = said_by(program, tmp_path).split("] ")
         assert answers == "[1.0, 2.0, 3.0, 4.0"
         assert compiled.startswith(own)
         assert len(list((tmp_path / "cache").rglob("*.nbc"))) == 4

@@ -1,19 +1,12 @@
 """Kernels on disk: whatever is wrong with a file there, the kernel runs; and it is never an old one."""
 
 import pickle
-import subprocess
-import sys
 
 import pytest
+from programs import LISTEN, said_by
 
-PROGRAM = """
-import sys
-from numba.core import event
-compiled = []
-class Listener(event.Listener):
-    def on_start(self, event): compiled.append(event.data["dispatcher"].py_func.__name__)
-    def on_end(self, event): pass
-event.register("numba:compile", Listener())
+PROGRAM = f"""
+{LISTEN}
 import outer
 print(outer.twice(3), outer.thrice(3), len(compiled))
 """
@@ -48,11 +41,7 @@ def run(tmp_path, monkeypatch):
 
     def run(factor=3, more=0):
         (tmp_path / "inner.py").write_text(INNER.format(factor=factor, more=more))
-        command = [sys.executable, "-B", "-c", PROGRAM]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
-        assert done.returncode == 0, done.stderr
-        assert done.stderr == ""
-        return [int(word) for word in done.stdout.split()]
+        return [int(word) for word in said_by(PROGRAM, tmp_path).split()]
 
     return run
 

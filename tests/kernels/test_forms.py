@@ -1,11 +1,9 @@
 """Forms of kernels that edgel brings along: they are used, give the same, and never stand for another source."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from programs import LISTEN, said_by
 
 PACKAGING = Path(__file__).parents[2] / "packaging"
 WRITE = """
@@ -14,18 +12,13 @@ from edgel._kernels import forms
 import work
 forms.write(forms_of(lambda: (work.total(np.arange(9.0)), work.nearest(np.arange(9.0), 3.2))), path)
 """
-USE = """
-from numba.core import event
+USE = f"""
 from edgel._kernels import forms
 forms.FILE = path
-compiled = []
-class Listener(event.Listener):
-    def on_start(self, event): compiled.append(event.data["dispatcher"].py_func.__name__)
-    def on_end(self, event): pass
-event.register("numba:compile", Listener())
+{LISTEN}
 import work
 x = np.linspace(0, 1, 1001)
-print(work.total(x).hex(), work.nearest(x, 0.31), len(set(compiled) & {"total", "nearest"}))
+print(work.total(x).hex(), work.nearest(x, 0.31), len(set(compiled) & {{"total", "nearest"}}))
 """
 WORK = """
 from edgel._kernels.parallel import kernel, summing_routine
@@ -49,25 +42,15 @@ def nearest(x, to):
 
 
 @pytest.fixture
-def run(tmp_path):
+def run(tmp_path, monkeypatch):
     (tmp_path / "work.py").write_text(WORK.replace("MORE", "1"))
 
     def run(program, cache):
         begin = (
             f"import sys, numpy as np, pathlib; path = pathlib.Path('forms.zip'); sys.path.append({str(PACKAGING)!r})"
         )
-        done = subprocess.run(
-            [sys.executable, "-B", "-c", begin + program],
-            cwd=tmp_path,
-            env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / cache)},
-            capture_output=True,
-            text=True,
-            timeout=120,
-            check=False,
-        )
-        assert done.returncode == 0, done.stderr
-        assert done.stderr == ""
-        return done.stdout.split()
+        monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / cache))
+        return said_by(begin + program, tmp_path).split()
 
     return run
 
