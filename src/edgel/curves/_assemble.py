@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from edgel.curves import _fit
-from edgel.curves._circle import RADIUS
+from edgel.curves._circle import RADIUS, locals_of
 from edgel.curves._corners import Nodes, meet, without_passed, without_unsure
 from edgel.curves._curves import CurveKind, Curves
 from edgel.curves._gather import on_shapes
@@ -107,8 +107,7 @@ def _held(
 
     The update of a Kalman filter: the least change of all unknowns, in their standard deviations, that does it.
     """
-    offset = places - shape[:, :3]
-    x, y, z = (np.einsum("ij,ij->i", offset, shape[:, 3 + 3 * k : 6 + 3 * k]) for k in range(3))
+    x, y, z = locals_of(shape, places)
     rho = np.hypot(x, y)
     miss = np.stack([rho - shape[:, RADIUS], z], axis=1)
     # How both change with tilt, centre, radius and height.

@@ -115,9 +115,15 @@ def fit_circle(points, rows, shape):
     return total / count
 
 
-def offsets(shapes: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return the distances (N,) of places (N, 3) from shapes (N, 13), each from its own; NaN where it has none."""
-    x, y, z = (np.einsum("ij,ij->i", places - shapes[:, :3], shapes[:, k : k + 3]) for k in (3, 6, 9))
+def locals_of(shapes: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return the coordinates, (N,) each, of places (N, 3) in the axes of shapes (N, 13), each in those of its own."""
+    offset = places - shapes[:, :3]
+    return tuple(np.einsum("ij,ij->i", offset, shapes[:, k : k + 3]) for k in (3, 6, 9))
+
+
+def offsets_of(shapes: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Return how far places (N, 3) are from shapes (N, 13), (N,), each from its own; NaN where it has none."""
+    x, y, z = locals_of(shapes, places)
     rho = np.hypot(x, y)
     return np.where(shapes[:, RADIUS] == 0, rho, np.hypot(rho - shapes[:, RADIUS], z))
 

@@ -10,7 +10,7 @@ import numpy as np
 from edgel._kernels.parallel import kernel, routine
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import knn
-from edgel.curves._circle import RADIUS, offset_of, offsets, tangent_of
+from edgel.curves._circle import RADIUS, offset_of, offsets_of, tangent_of
 
 REACH = 3.5
 """Spacings: so far from where its points end a curve meets others."""
@@ -101,8 +101,10 @@ def without_unsure(nodes: Nodes, noise: float, spacing: np.ndarray) -> Nodes:
 
     Takes the noise in spacings and the spacing (N,) of the curves.
     """
+    if noise > _NOISY:
+        return nodes
     uses, h = _uses(nodes, spacing)
-    return _without(nodes, (uses == 2) & (nodes.std > (_UNSURE + _BY_NOISE * noise) * h), noise)
+    return _without(nodes, (uses == 2) & (nodes.std > (_UNSURE + _BY_NOISE * noise) * h))
 
 
 def without_passed(
@@ -112,16 +114,16 @@ def without_passed(
 
     Takes which curves (T, 2) pass through which nodes, and the shapes (N, 13) of the curves, else as `without_unsure`.
     """
-    if not len(nodes.position):
+    if noise > _NOISY or not len(nodes.position):
         return nodes
     uses, h = _uses(nodes, spacing)
     near = knn(build_index(position), nodes.position, 1)
     curve = np.concatenate([np.nonzero(nodes.of_end >= 0)[0], through[:, 1]])
     node = np.concatenate([nodes.of_end[nodes.of_end >= 0], through[:, 0]])
     aside = np.full(len(h), np.inf)
-    np.fmin.at(aside, node, offsets(shapes[curve], position[near.points[node, 0]]))
+    np.fmin.at(aside, node, offsets_of(shapes[curve], position[near.points[node, 0]]))
     passed = (near.distances[:, 0] > (_LONE + _BY_NOISE * noise) * h) & (aside > (_PASSED + _BY_NOISE * noise) * h)
-    return _without(nodes, (uses + np.bincount(through[:, 0], minlength=len(h)) == 2) & passed, noise)
+    return _without(nodes, (uses + np.bincount(through[:, 0], minlength=len(h)) == 2) & passed)
 
 
 def _uses(nodes: Nodes, spacing: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -131,12 +133,10 @@ def _uses(nodes: Nodes, spacing: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return ends, np.bincount(nodes.of_end[meeting], np.repeat(spacing, 2)[meeting.ravel()], count) / np.maximum(ends, 1)
 
 
-def _without(nodes: Nodes, out: np.ndarray, noise: float) -> Nodes:
-    """Leave out some nodes, if they are corners, and if noise lets the one kind be told from the other."""
-    if not len(out) or noise > _NOISY:
-        return nodes
-    of_end = np.where((nodes.of_end >= 0) & (nodes.is_corner & out)[nodes.of_end], -1, nodes.of_end)
-    return replace(nodes, of_end=of_end)
+def _without(nodes: Nodes, out: np.ndarray) -> Nodes:
+    """Leave out some nodes (M,), if they are corners."""
+    gone = np.append(nodes.is_corner & out, False)  # the last, for ends that have no node
+    return replace(nodes, of_end=np.where(gone[nodes.of_end], -1, nodes.of_end))
 
 
 def _equations(ends: Ends, flat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -10,7 +10,7 @@ from edgel._kernels.parallel import kernel, routine, run_slices
 from edgel._neighbors.kdtree import NeighborIndex
 from edgel.curves import _fit
 from edgel.curves._circle import RADIUS, along_of
-from edgel.curves._gather import gather, widened
+from edgel.curves._gather import gather_all, widened
 from edgel.curves._measure import Measured
 from edgel.curves._profile import in_profile
 
@@ -87,10 +87,7 @@ def _extents(
             if 0 <= b < bins:
                 edges[b] += 1
         if fits[k, _fit.STATE] == _fit.MEASURED:
-            number_near = gather(places, boxes, shapes[k], low[k], high[k], _FAR * h, near)
-            if number_near > len(near):
-                near = np.empty((2 * number_near, 3))
-                gather(places, boxes, shapes[k], low[k], high[k], _FAR * h, near)
+            near, number_near = gather_all(places, boxes, shapes[k], low[k], high[k], _FAR * h, near)
             _count_sides(shapes[k], fits[k], near[:number_near], h, low[k], width, around, sides)
         speaks = (edges > 0) | ((sides[:, 0] > 0) & (sides[:, 1] > 0))
         _intervals(speaks, edges, h, low[k], width, whole[k], k, ends, closed, found, number)

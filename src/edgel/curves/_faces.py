@@ -17,7 +17,7 @@ from edgel.curves import _fit
 from edgel.curves._circle import RADIUS, lean
 from edgel.curves._equations import LEAST, TOLERANCES, collect, collect_edge, is_small, put_together, solve, spread_of
 from edgel.curves._fit import BENT, CENTRE, HEIGHT, SIZE, TURN, UNKNOWNS
-from edgel.curves._gather import gather
+from edgel.curves._gather import gather_all
 from edgel.curves._profile import choose_sides, face_of, in_profile, mean_normals
 
 _ROUNDS, _BENDING, _SQUARING = 8, 4, 5
@@ -53,10 +53,9 @@ def fit_faces(
         shape, fit, covariance, h, own = shapes[q], fits[q], covariances[q], spacing[k], rows[first[k] : first[k + 1]]
         is_line = shape[RADIUS] == 0.0
         low, high, lever = _span(shape, ranges[k, 0], ranges[k, 1], h)
-        number_near = gather(places, boxes, shape, low, high, (reach + _MARGIN) * h, scratch)
-        if number_near > len(scratch):
-            scratch, profile = np.empty((2 * number_near, 3)), np.empty((2 * number_near, 2))
-            number_near = gather(places, boxes, shape, low, high, (reach + _MARGIN) * h, scratch)
+        scratch, number_near = gather_all(places, boxes, shape, low, high, (reach + _MARGIN) * h, scratch)
+        if len(profile) < len(scratch):
+            profile = np.empty((len(scratch), 2))
         near = scratch[:number_near]
         fewer = _put_some_first(shape, near, h, profile)
         mean_normals(shape, own, position, normals, faces)

@@ -79,3 +79,13 @@ def gather(places, boxes, shape, low, high, reach, near):
                     near[number, 0], near[number, 1], near[number, 2] = x, y, z
                 number += 1
     return number
+
+
+@routine
+def gather_all(places, boxes, shape, low, high, reach, near):
+    """Gather all points beside a shape into `near`, a larger one where it has no room; return it, and how many."""
+    number = gather(places, boxes, shape, low, high, reach, near)
+    if number > len(near):
+        near = np.empty((2 * number, 3))
+        gather(places, boxes, shape, low, high, reach, near)
+    return near, number

@@ -9,8 +9,8 @@ import numpy as np
 
 from edgel._kernels.parallel import kernel, routine, run_slices
 from edgel.curves import _fit
-from edgel.curves._circle import RADIUS, lean
-from edgel.curves._gather import gather
+from edgel.curves._circle import RADIUS, lean, local
+from edgel.curves._gather import gather_all
 from edgel.curves._points import EdgePoints
 from edgel.curves._strands import Strands
 
@@ -45,10 +45,7 @@ def _turn(start, stop, which, shapes, fits, ranges, places, boxes, spacing):
         shape, h, half = shapes[k], spacing[k], 0.5 * (ranges[k, 1] - ranges[k, 0])
         middle = ranges[k, 0] + half
         low, high = ranges[k, 0] - _PAST * h, ranges[k, 1] + _PAST * h
-        number = gather(places, boxes, shape, low, high, _REACH * h, near)
-        if number > len(near):
-            near = np.empty((2 * number, 3))
-            number = gather(places, boxes, shape, low, high, _REACH * h, near)
+        near, number = gather_all(places, boxes, shape, low, high, _REACH * h, near)
         for axis in range(3):
             shape[axis] += middle * shape[9 + axis]
         ranges[k, 0], ranges[k, 1] = -half, half
@@ -68,9 +65,8 @@ def _inward(shape, near, h):
     """Return the direction across a line in which the surface lies, in the line's own frame; zeros on both sides."""
     a = b = 0.0
     for i in range(len(near)):
-        x, y, z = near[i, 0] - shape[0], near[i, 1] - shape[1], near[i, 2] - shape[2]
-        a += (x * shape[3] + y * shape[4] + z * shape[5]) / len(near)
-        b += (x * shape[6] + y * shape[7] + z * shape[8]) / len(near)
+        u, v, _ = local(shape, near[i, 0], near[i, 1], near[i, 2])
+        a, b = a + u / len(near), b + v / len(near)
     length = math.sqrt(a * a + b * b)
     return (a / length, b / length) if length > _ONE_SIDED * h else (0.0, 0.0)
 
@@ -79,9 +75,8 @@ def _inward(shape, near, h):
 def _find_outermost(shape, near, a, b, half, h, outermost):
     """Write how far along the line and how far outside the outermost point of each spacing lies."""
     for i in range(len(near)):
-        x, y, z = near[i, 0] - shape[0], near[i, 1] - shape[1], near[i, 2] - shape[2]
-        u, v = x * shape[3] + y * shape[4] + z * shape[5], x * shape[6] + y * shape[7] + z * shape[8]
-        along, out, off = x * shape[9] + y * shape[10] + z * shape[11], -(a * u + b * v), b * u - a * v
+        u, v, along = local(shape, near[i, 0], near[i, 1], near[i, 2])
+        out, off = -(a * u + b * v), b * u - a * v
         if out < -_INSIDE * h or out > _OUTSIDE * h or abs(off) > _OFF * h:
             continue
         best = outermost[min(max(int((along + half) / h), 0), len(outermost) - 1)]
@@ -91,7 +86,7 @@ def _find_outermost(shape, near, a, b, half, h, outermost):
 
 @routine
 def _slope(outermost, h):
-    """Return the slope of the robust line through the outermost points, and its standard deviation; 0 for too few."""
+    """Return the slope of the robust line through the outermost points, and its deviation: NaN for too few points."""
     scatter, slope, offset, lever = math.inf, 0.0, 0.0, 0.0
     for _ in range(_ROUNDS):
         s = sx = sy = sxx = sxy = rest = 0.0
@@ -101,13 +96,8 @@ def _slope(outermost, h):
                 continue
             off = y - offset - slope * x
             weight = 1.0 / (1.0 + (off / (2.0 * scatter)) ** 2)
-            s, sx, sy, sxx, sxy = (
-                s + weight,
-                sx + weight * x,
-                sy + weight * y,
-                sxx + weight * x * x,
-                sxy + weight * x * y,
-            )
+            s, sx, sy = s + weight, sx + weight * x, sy + weight * y
+            sxx, sxy = sxx + weight * x * x, sxy + weight * x * y
             count += 1
         if count < _LEAST:
             return 0.0, math.nan

@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 
 from edgel.curves import _fit
-from edgel.curves._circle import RADIUS, SHAPE
+from edgel.curves._circle import RADIUS, SHAPE, locals_of
 from edgel.curves._corners import Ends
 from edgel.curves._extent import extents
 from edgel.curves._gather import on_shapes
@@ -123,8 +123,7 @@ def _evident(
 
 def along_of_all(shape: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Return how far along shapes (N, 13) places (N, 3) are, each along its own."""
-    offset = places - shape[:, :3]
-    x, y, z = (np.einsum("ij,ij->i", offset, shape[:, 3 + 3 * k : 6 + 3 * k]) for k in range(3))
+    x, y, z = locals_of(shape, places)
     return np.where(shape[:, RADIUS] == 0, z, shape[:, RADIUS] * np.arctan2(y, x))
 
 

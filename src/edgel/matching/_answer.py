@@ -79,7 +79,7 @@ def _answer(
     (pose, *_), score = found.poses, float(found.scores[0])
     same, group = same_answers(match, found, swapped, symmetries)
     others = found.scores[~same]
-    margin = margin_of(found, max(float(others[0]), 0.0) if len(others) else 0.0)
+    margin = margin_of(found, float(others.max(initial=0.0)))
     turned = found.poses if not swapped else np.linalg.inv(found.poses)
     alternatives = Poses(turned[1:], found.scores[1:])
     doubt = _doubt(found, margin, _LEAST_GIVEN if method == "initial" else _LEAST_SCORE)
@@ -148,7 +148,7 @@ def agreement(found: Found) -> float:
 
 
 def margin_of(found: Found, other: float) -> float:
-    """How far the best pose is ahead of another score, in how far is far, as far as its edges agree."""
+    """How far the best pose is ahead of another score: 1 from `_FAR` on, less where its edges do not all agree."""
     score = float(found.scores[0])
     return agreement(found) * float(np.clip((score - other) / max(_FAR[0] * score, _FAR[1]), 0, 1))
 
