@@ -8,7 +8,7 @@ from edgel.matching._grid import build_grid, find_cell
 from edgel.matching._half_edges import rareness
 from edgel.matching._open import rotation_of, vector_of
 from edgel.matching._search import Found
-from edgel.matching._sight import build_sight, look
+from edgel.matching._sight import build_sight, empty_rays, look
 from edgel.matching._verify import EDGE, MISSING
 
 
@@ -52,8 +52,52 @@ def test_a_ray_beside_an_outline_looked_through_nothing():
         assert look(sight, 100 * well, 100 * y, 100.0, 1.0) == -1
 
 
+def frame(height=60, width=80, *, spherical=False):
+    """What a camera sees of a ball, and of which pixels it sees nothing; moved somewhere."""
+    row, column = (values.ravel() for values in np.mgrid[:height, :width])
+    u, v = (column - 35.0) / 90, (row - 31.0) / 80
+    rays = np.column_stack([u, v, np.ones(len(u))])
+    if spherical:
+        rays = np.column_stack([np.sin(9 * u) * np.cos(v), np.sin(v), np.cos(9 * u) * np.cos(v)])
+    seen = np.flatnonzero(np.hypot(u, v) < 0.28)
+    xyz = np.full((len(u), 3), np.nan)
+    xyz[seen] = rays[seen] * (5 - np.hypot(u, v)[seen])[:, None]
+    turn, eye = rotation_of(np.array([0.4, -1.0, 0.7])), np.array([3.0, -2.0, 9.0])
+    return xyz @ turn.T + eye, rays @ turn.T, seen, eye, (height, width)
+
+
+def test_the_rays_on_which_a_camera_got_nothing():
+    xyz, rays, seen, eye, shape = frame()
+    found = empty_rays(xyz, shape, seen, eye)
+    assert found is not None
+    true = np.delete(rays, seen, axis=0)
+    cosine = (found * true).sum(axis=1) / np.linalg.norm(found, axis=1) / np.linalg.norm(true, axis=1)
+    assert cosine.min() > 1 - 1e-9
+
+
+def test_lists_and_sweeps_do_not_say_where_they_looked():
+    xyz, _, seen, eye, _ = frame()
+    assert empty_rays(xyz, None, seen, eye) is None
+    assert empty_rays(xyz, (60, 80), seen[:50], eye) is None
+    xyz, _, seen, eye, shape = frame(spherical=True)
+    assert empty_rays(xyz, shape, seen, eye) is None
+    xyz, _, seen, eye, shape = frame()
+    line = seen[seen // 80 == 31]  # of one row alone
+    assert empty_rays(xyz, shape, np.tile(line, 5), eye) is None
+
+
+def test_where_a_camera_looked_and_got_nothing_is_told_from_where_it_did_not_look():
+    xyz, rays, seen, eye, shape = frame()
+    sight = build_sight(xyz[seen], eye, empty_rays(xyz, shape, seen, eye))
+    corner, beyond = eye + 4 * rays[0], eye + 4 * (2 * rays[0] - rays[shape[1] // 2 + shape[1] * shape[0] // 2])
+    assert look(sight, *corner, 0.1) == 3
+    assert look(sight, *beyond, 0.1) == 2
+    assert look(build_sight(xyz[seen], eye), *corner, 0.1) == 2
+    assert all(look(sight, *xyz[p], 0.1) == 0 for p in seen)
+
+
 def found_with(edge, missing, score):
-    columns = np.zeros((1, 2, 5))
+    columns = np.zeros((1, 2, 6))
     columns[0, 0, [EDGE, MISSING]] = edge, missing
     return Found(np.eye(4)[None], np.array([score]), columns)
 

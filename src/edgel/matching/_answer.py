@@ -15,7 +15,7 @@ from edgel.matching._verify import EDGE, MISSING, SURFACE, VISIBLE
 
 SURE = 0.1
 """Margin from which on an answer can be relied on: `docs/matching.md` says how often such answers are right."""
-_LEAST_SCORE, _LEAST_FIT, _LEAST_AGREEMENT, _LEAST_OVERLAP = 0.15, 0.5, 0.1, 0.4
+_LEAST_SCORE, _LEAST_FIT, _LEAST_AGREEMENT, _LEAST_OVERLAP = 0.15, 0.4, 0.1, 0.4
 _LEAST_GIVEN = 0.05  # score of a pose that was given, and not found among others
 _FAR = (0.5, 0.25)  # of the score, and at least: as far behind as that is out of the question
 _ORDERS = 15.0  # spacings of either cloud that the other has to be large
@@ -157,7 +157,7 @@ def _doubt(found: Found, margin: float, least: float = _LEAST_SCORE) -> str:
     """Say why the best pose is not believed; empty if it is."""
     score, fitness = float(found.scores[0]), _fitness(found)
     if fitness < _LEAST_FIT:
-        return f"no pose is confirmed: the best lets {fitness:.0%} of the surface lie where it should, half is asked"
+        return f"no pose is confirmed: the best lets {fitness:.0%} of the surface lie where it should, {_LEAST_FIT:.0%} is asked"
     if score < least:
         return f"no pose is confirmed by edges and surface: the best scores {score:.2f}, {least:g} is asked"
     if agreement(found) < _LEAST_AGREEMENT:

@@ -20,10 +20,11 @@ from edgel._range_image import without_no_return
 from edgel.cloud import Cloud, as_cloud, check_points
 from edgel.edges import EdgeKind, Edges
 from edgel.matching._half_edges import HalfEdges, of_edges
-from edgel.matching._sight import Sight, build_sight, no_sight
+from edgel.matching._sight import Sight, build_sight, empty_rays, no_sight
 
 MOST_SURFACE = 4000
-"""Places of a surface that are kept."""
+"""Places of a surface that are kept, of a small cloud."""
+_OF_LARGE = 3, 16_000  # points for each place of a larger one, and most places: narrow faces of parts have to have some
 _PLANE = 24  # neighbours of a plane fit: noise of half a spacing leaves normals good to 3 degrees
 _CLEAR = 2.5  # spacings from any edge, from where on planes are those of one face
 _SMOOTH = 4.0  # spacings from any edge, from where on a surface is seen to be smooth
@@ -91,7 +92,8 @@ def prepare(points: Any, edges: Edges | None, name: str) -> Prepared:
     discs = knn(index, index.at(index.evenly_sampled(2000)), k).distances[:, -1]
     spacing = float(np.sqrt(np.pi / k) * np.median(discs))
     size = float(np.linalg.norm(np.diff(np.quantile(xyz, (0.02, 0.98), axis=0), axis=0)))
-    thinned = thin_to(xyz, MOST_SURFACE, spacing)
+    points_each, most = _OF_LARGE
+    thinned = thin_to(xyz, int(np.clip(len(xyz) // points_each, MOST_SURFACE, most)), spacing)
     rows = finite.rows[order][thinned]
     planes = estimate_normals(cloud, at=rows, num_neighbors=_PLANE)
     kept = np.isfinite(planes.offset)
@@ -102,7 +104,9 @@ def prepare(points: Any, edges: Edges | None, name: str) -> Prepared:
     half = half.take(np.lexsort((*half.frames.reshape(-1, 9).T, *half.places.T)))
     clear = away > _CLEAR * spacing
     clear |= clear.sum() < _FEWEST
-    sight = no_sight() if cloud.viewpoint is None else build_sight(xyz, cloud.viewpoint)
+    sight = no_sight()
+    if cloud.viewpoint is not None:
+        sight = build_sight(xyz, cloud.viewpoint, empty_rays(cloud.xyz, cloud.shape, finite.rows, cloud.viewpoint))
     smooth = away[clear] >= _SMOOTH * spacing
     gap = spacing * float(np.sqrt(len(xyz) / len(thinned)))
     return Prepared(half, places[clear], normals[clear], smooth, gap, spacing, size, sight)

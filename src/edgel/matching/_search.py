@@ -33,9 +33,9 @@ class Found:
     poses : (P, 4, 4) float64
         T_target_source.
     scores : (P,) float64
-    columns : (P, 2, 5) float64
+    columns : (P, 2, 6) float64
         See `edgel.matching._verify.confirm`: the source looked for in the target, and the other way round; the former's
-        `MISSING` counts those of both.
+        `MISSING` and `THROUGH` count those of both.
     """
 
     poses: np.ndarray
@@ -117,8 +117,8 @@ class Match:
             return Found(poses, np.empty(0), np.empty((0, 2, 5)))
         there = confirm(poses, self.few, self.fine, self.tight)
         back = confirm(np.linalg.inv(poses), *self.back, self.tight)
-        there[:, MISSING] += back[:, MISSING]
-        scores = scores_of(there) - back[:, THROUGH]
+        there[:, (MISSING, THROUGH)] += back[:, (MISSING, THROUGH)]
+        scores = scores_of(there)
         found = Found(poses, scores, np.stack([there, back], axis=1)).take(np.argsort(-scores, kind="stable"))
         return found.take(distinct_rows(found.poses, self.whole, self.same))
 

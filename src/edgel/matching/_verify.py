@@ -16,11 +16,13 @@ _FRAME_COSINE = math.cos(math.radians(20.0))
 _NORMAL_COSINE = math.cos(math.radians(30.0))
 TURN = 0.22  # radians by which the two sides of one edge may differ
 OUTLINE = 0.6  # weight of an outline's match: only one face is seen, and where a view ends is no edge
-EDGE, SURFACE, THROUGH, MISSING, VISIBLE = range(5)
+EDGE, SURFACE, THROUGH, MISSING, VISIBLE, NOTHING = range(6)
 """Columns of `confirm`."""
 _EDGES = 1.5  # weight of the edges' share against the surface's
-_MISSING = 2.0  # weight of creases where the other surface is seen to be smooth
+_MISSING = 2.5  # weight of creases where the other surface is seen to be smooth
 _THROUGH = 6.0  # and of surface that the sensor looked through: a true pose has next to none
+_NOTHING = 3.0  # and of surface that faces the sensor where it looked and got nothing
+_FACING = 0.25  # least cosine to the line of sight of a surface that has to return something
 
 
 class Probes(NamedTuple):
@@ -165,7 +167,7 @@ def _confirm(start, stop, poses, probes, field, tolerance, columns):
                 found, _ = find_surface(field, x, y, z, bend * n0, bend * n1, bend * n2, tolerance)
                 if found >= 0 and field.smooth[found]:
                     missing += w
-        surface, through, visible, share = 0.0, 0.0, 0.0, 0.0
+        surface, through, visible, nothing, share = 0.0, 0.0, 0.0, 0.0, 0.0
         for s in range(len(probes.surface_weights)):
             x, y, z = move(pose, probes.surface[s])
             n0, n1, n2 = turned_by(pose, probes.normals[s])
@@ -181,10 +183,19 @@ def _confirm(start, stop, poses, probes, field, tolerance, columns):
                 through += w
             if seen <= 0 or not has_sight:
                 visible += w
+            if seen == 3 and _faces(field.sight.eye, x, y, z, n0, n1, n2):
+                nothing += w
         columns[p, 0] = edge / weight if weight > 0.0 else 0.0
         columns[p, 1], columns[p, 2] = surface / share, through / share
         columns[p, 3] = missing / weight if weight > 0.0 else 0.0
-        columns[p, 4] = visible / share
+        columns[p, 4], columns[p, 5] = visible / share, nothing / share
+
+
+@kernel
+def _faces(eye, x, y, z, n0, n1, n2):
+    """Tell whether a surface at a place faces a sensor's."""
+    dx, dy, dz = eye[0] - x, eye[1] - y, eye[2] - z
+    return n0 * dx + n1 * dy + n2 * dz > _FACING * math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
 def confirm(poses: np.ndarray, probes: Probes, field: Field, tolerance: float) -> np.ndarray:
@@ -192,18 +203,19 @@ def confirm(poses: np.ndarray, probes: Probes, field: Field, tolerance: float) -
 
     Returns
     -------
-    (P, 5) float64
+    (P, 6) float64
         Shares, 0 to 1, by columns: `EDGE` of the edges found, `SURFACE` of the surface found, both by how near;
         `THROUGH` of the surface through which the other sensor looked; `MISSING` of the creases where the other surface
-        is smooth; `VISIBLE` of the surface where the other sensor, if there is one, saw something no nearer.
+        is smooth; `VISIBLE` of the surface where the other sensor, if there is one, saw something no nearer; `NOTHING`
+        of the surface that faces the other sensor, which looked there and got nothing.
     """
-    columns = np.empty((len(poses), 5))
+    columns = np.empty((len(poses), 6))
     run_slices(_confirm, len(poses), np.ascontiguousarray(poses), probes, field, tolerance, columns, size=16)
     return columns
 
 
 def scores_of(columns: np.ndarray) -> np.ndarray:
-    """Weigh what speaks for poses against what speaks against them, (P,): at most 1."""
+    """Weigh what speaks for poses (P, 6) against what speaks against them, (P,): at most 1."""
     for_it = _EDGES * columns[:, EDGE] + columns[:, SURFACE]
-    against = _THROUGH * columns[:, THROUGH] + _MISSING * columns[:, MISSING]
+    against = _THROUGH * columns[:, THROUGH] + _MISSING * columns[:, MISSING] + _NOTHING * columns[:, NOTHING]
     return (for_it - against) / (1 + _EDGES)
