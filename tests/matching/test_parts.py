@@ -89,11 +89,15 @@ def test_lists_and_sweeps_do_not_say_where_they_looked():
 def test_where_a_camera_looked_and_got_nothing_is_told_from_where_it_did_not_look():
     xyz, rays, seen, eye, shape = frame()
     sight = build_sight(xyz[seen], eye, empty_rays(xyz, shape, seen, eye))
+
+    def said(place, sight=sight):
+        return look(sight, place[0], place[1], place[2], 0.1)
+
     corner, beyond = eye + 4 * rays[0], eye + 4 * (2 * rays[0] - rays[shape[1] // 2 + shape[1] * shape[0] // 2])
-    assert look(sight, *corner, 0.1) == 3
-    assert look(sight, *beyond, 0.1) == 2
-    assert look(build_sight(xyz[seen], eye), *corner, 0.1) == 2
-    assert all(look(sight, *xyz[p], 0.1) == 0 for p in seen)
+    assert said(corner) == 3
+    assert said(beyond) == 2
+    assert said(corner, build_sight(xyz[seen], eye)) == 2
+    assert all(said(xyz[p]) == 0 for p in seen)
 
 
 def found_with(edge, missing, score):

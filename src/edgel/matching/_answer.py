@@ -157,7 +157,8 @@ def _doubt(found: Found, margin: float, least: float = _LEAST_SCORE) -> str:
     """Say why the best pose is not believed; empty if it is."""
     score, fitness = float(found.scores[0]), _fitness(found)
     if fitness < _LEAST_FIT:
-        return f"no pose is confirmed: the best lets {fitness:.0%} of the surface lie where it should, {_LEAST_FIT:.0%} is asked"
+        there = f"{fitness:.0%} of the surface lie where it should, {_LEAST_FIT:.0%} is asked"
+        return f"no pose is confirmed: the best lets {there}"
     if score < least:
         return f"no pose is confirmed by edges and surface: the best scores {score:.2f}, {least:g} is asked"
     if agreement(found) < _LEAST_AGREEMENT:

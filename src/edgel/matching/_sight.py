@@ -130,7 +130,7 @@ def _note_empty(directions, near, far):
 def look(sight, x, y, z, tolerance):
     """Say what a sensor makes of a place: -1 it looked through it, 1 it stands behind what was seen, else 0.
 
-    Where it saw nothing that is 2, and 3 where it looked for certain: surfaces that return no light are not empty space.
+    Where it got nothing it is 2, and 3 if it is known to have looked: what returns no light is not empty space.
     """
     dx, dy, dz = x - sight.eye[0], y - sight.eye[1], z - sight.eye[2]
     away = np.sqrt(dx * dx + dy * dy + dz * dz)
