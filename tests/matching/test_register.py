@@ -9,6 +9,8 @@ import pytest
 import edgel
 from edgel import Cloud, synth
 from edgel.matching._prepare import prepare
+from edgel.matching._search import Match
+from edgel.matching._verify import NOTHING, confirm
 
 SPACING = 1.6
 
@@ -104,6 +106,25 @@ def test_two_views_of_a_part():
     seen = first.cloud.xyz[np.isfinite(first.cloud.xyz[:, 0])]
     assert answer.found
     assert off(answer.T_target_source, true, seen) < 0.5
+
+
+def test_what_sticks_out_of_what_a_camera_saw_speaks_against_a_pose():
+    """Slid along the face of the block that both see, one view sticks out of the other's silhouette."""
+    first, second = view((-0.48, 0.66, -0.58)), view((0.3, 0.75, -0.6), 1)
+    true = second.pose @ np.linalg.inv(first.pose)
+    slid = true @ pose(np.eye(3), 12 * SPACING * first.pose[:3, 0])
+    source, frame = prepare(first.cloud, None, "source"), prepare(second.cloud, None, "target")
+    assert second.cloud.shape is not None
+    assert len(second.cloud.shape) == 2
+    seen = np.isfinite(second.cloud.xyz).all(axis=1)
+    points = prepare(Cloud(second.cloud.xyz[seen], viewpoint=second.cloud.viewpoint), None, "target")
+    nothing = {}
+    for name, target in (("frame", frame), ("points", points)):
+        match = Match.of(source, target)
+        nothing[name] = confirm(np.stack([true, slid]), match.few, match.fine, match.tight)[:, NOTHING]
+    assert nothing["frame"][0] < 0.005
+    assert nothing["frame"][1] > 0.05
+    assert (nothing["points"] == 0).all()  # a list does not say where its sensor looked
 
 
 def test_a_pose_nearby_is_refined():
