@@ -12,7 +12,7 @@ from edgel._detect import detect
 from edgel._neighbors.estimate import estimate_normals
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import knn
-from edgel._neighbors.normals import SENSOR, UNKNOWN
+from edgel._neighbors.normals import SENSOR, UNKNOWN, Normals
 from edgel._neighbors.orientation import outward_normals, who_knows
 from edgel._neighbors.thinning import thin_to
 from edgel._objects import NORMALS
@@ -26,6 +26,8 @@ MOST_SURFACE = 4000
 """Places of a surface that are kept, of a small cloud."""
 _OF_LARGE = 3, 16_000  # points for each place of a larger one, and most places: narrow faces of parts have to have some
 _PLANE = 24  # neighbours of a plane fit: noise of half a spacing leaves normals good to 3 degrees
+_FEW = 8  # neighbours of a plane where those of `_PLANE` lie on both walls of a thin part, or on a bend
+_WORSE = 2.0  # times the spread off the plane of few neighbours: with more they lie on it no longer
 _CLEAR = 2.5  # spacings from any edge, from where on planes are those of one face
 _SMOOTH = 4.0  # spacings from any edge, from where on a surface is seen to be smooth
 _FEWEST = 50
@@ -95,7 +97,7 @@ def prepare(points: Any, edges: Edges | None, name: str) -> Prepared:
     points_each, most = _OF_LARGE
     thinned = thin_to(xyz, int(np.clip(len(xyz) // points_each, MOST_SURFACE, most)), spacing)
     rows = finite.rows[order][thinned]
-    planes = estimate_normals(cloud, at=rows, num_neighbors=_PLANE)
+    planes = _planes_of_faces(cloud, rows)
     kept = np.isfinite(planes.offset)
     normals, places = planes.normals[kept], xyz[thinned][kept]
     places = places - ((places * normals).sum(axis=1) - planes.offset[kept])[:, None] * normals
@@ -110,6 +112,19 @@ def prepare(points: Any, edges: Edges | None, name: str) -> Prepared:
     smooth = away[clear] >= _SMOOTH * spacing
     gap = spacing * float(np.sqrt(len(xyz) / len(thinned)))
     return Prepared(half, places[clear], normals[clear], smooth, gap, spacing, size, sight)
+
+
+def _planes_of_faces(cloud: Cloud, rows: np.ndarray) -> Normals:
+    """Fit planes that keep to one face at some points of a cloud.
+
+    Planes through both walls of a pipe lie inside it: a part of which a view shows one wall would be put .45 spacings
+    too near to the sensor.
+    """
+    planes, of_few = (estimate_normals(cloud, at=rows, num_neighbors=k) for k in (_PLANE, _FEW))
+    spread, least = (np.sqrt(p.residual / (k - 3)) for p, k in ((planes, _PLANE), (of_few, _FEW)))
+    worse = np.flatnonzero(spread > _WORSE * least)
+    planes.put(worse, of_few.take(worse))
+    return planes
 
 
 def _turned_outwards(cloud: Cloud) -> Cloud:
