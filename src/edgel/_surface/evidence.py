@@ -21,6 +21,7 @@ MAX_AWAY = 1.5  # spacings: a line farther from the point is not its edge
 MIN_TURN = math.radians(12.0)  # of two planes that make an edge
 _MOST = 0.7  # of the turn that any neighbourhood shows
 _FLOOR = 0.02  # spacings: residuals below it do not make one fit better than another
+_OF_FITS = POINT.block("two_planes")
 _COS_MIN = math.cos(math.radians(20.0))  # of two planes through a point, whose angle is at least this
 
 
@@ -87,7 +88,7 @@ def _best_fit(features: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     The error of a line fitted to K points falls with the residual over the root of K: small fits win at curved and
     crowded edges, large ones under noise.
     """
-    fits = features[:, POINT.block("two_planes")].reshape(-1, len(FITS), two_planes.NUM_FEATURES)
+    fits = features[:, _OF_FITS].reshape(-1, len(FITS), two_planes.NUM_FEATURES)
     residual, turn, away = (
         fits[:, :, i].astype(np.float64) for i in (two_planes.TWO_PLANES, two_planes.TURN, two_planes.FOOT_AWAY)
     )
@@ -102,7 +103,7 @@ def support(evidence: Evidence) -> np.ndarray:
 
     Sharp edges show it to the few nearest; one that is rounded only to as many as reach over its bend.
     """
-    fits = evidence.features[:, POINT.block("two_planes")].reshape(-1, len(FITS), two_planes.NUM_FEATURES)
+    fits = evidence.features[:, _OF_FITS].reshape(-1, len(FITS), two_planes.NUM_FEATURES)
     turn = np.where(fits[:, :, two_planes.FOOT_AWAY] <= MAX_AWAY, fits[:, :, two_planes.TURN], 0.0)
     shown = turn >= _MOST * turn.max(axis=1, keepdims=True)
     return np.array([count for count, _ in FITS])[shown.argmax(axis=1)]
