@@ -28,6 +28,7 @@ _OF_LARGE = 3, 16_000  # points for each place of a larger one, and most places:
 _PLANE = 24  # neighbours of a plane fit: noise of half a spacing leaves normals good to 3 degrees
 _FEW = 8  # neighbours of a plane where those of `_PLANE` lie on both walls of a thin part, or on a bend
 _WORSE = 2.0  # times the spread off the plane of few neighbours: with more they lie on it no longer
+_ALONG_WALL = 0.9  # least cosine of both planes' normals
 _CLEAR = 2.5  # spacings from any edge, from where on planes are those of one face
 _SMOOTH = 4.0  # spacings from any edge, from where on a surface is seen to be smooth
 _FEWEST = 50
@@ -118,11 +119,16 @@ def _planes_of_faces(cloud: Cloud, rows: np.ndarray) -> Normals:
     """Fit planes that keep to one face at some points of a cloud.
 
     Planes through both walls of a pipe lie inside it: a part of which a view shows one wall would be put .45 spacings
-    too near to the sensor.
+    too near to the sensor, which itself sees one wall only.
     """
-    planes, of_few = (estimate_normals(cloud, at=rows, num_neighbors=k) for k in (_PLANE, _FEW))
+    planes = estimate_normals(cloud, at=rows, num_neighbors=_PLANE)
+    if cloud.viewpoint is not None:
+        return planes
+    of_few = estimate_normals(cloud, at=rows, num_neighbors=_FEW)
     spread, least = (np.sqrt(p.residual / (k - 3)) for p, k in ((planes, _PLANE), (of_few, _FEW)))
-    worse = np.flatnonzero(spread > _WORSE * least)
+    # Few points of a scan line lie on any plane through it.
+    alike = np.abs((planes.normals * of_few.normals).sum(axis=1)) > _ALONG_WALL
+    worse = np.flatnonzero((spread > _WORSE * least) & alike)
     planes.put(worse, of_few.take(worse))
     return planes
 
