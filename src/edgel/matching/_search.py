@@ -114,7 +114,7 @@ class Match:
     def verified(self, poses: np.ndarray) -> Found:
         """Verify poses by both clouds, best first, without those that come to the same."""
         if not len(poses):
-            return Found(poses, np.empty(0), np.empty((0, 2, 5)))
+            return Found(poses, np.empty(0), np.empty((0, 2, 6)))
         there = confirm(poses, self.few, self.fine, self.tight)
         back = confirm(np.linalg.inv(poses), *self.back, self.tight)
         there[:, (MISSING, THROUGH)] += back[:, (MISSING, THROUGH)]
