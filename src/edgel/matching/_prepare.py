@@ -13,7 +13,7 @@ from edgel._neighbors.estimate import estimate_normals
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import knn
 from edgel._neighbors.normals import SENSOR, UNKNOWN, Normals
-from edgel._neighbors.orientation import outward_normals, who_knows
+from edgel._neighbors.orientation import WORSE, outward_normals, who_knows
 from edgel._neighbors.thinning import thin_to
 from edgel._objects import NORMALS
 from edgel._range_image import without_no_return
@@ -24,10 +24,10 @@ from edgel.matching._sight import Sight, build_sight, empty_rays, no_sight
 
 MOST_SURFACE = 4000
 """Places of a surface that are kept, of a small cloud."""
-_OF_LARGE = 3, 16_000  # points for each place of a larger one, and most places: narrow faces of parts have to have some
+_MOST_OF_LARGE = 16_000  # and of a large one: narrow faces of parts have to have some
+_POINTS_EACH = 3  # for each of these
 _PLANE = 24  # neighbours of a plane fit: noise of half a spacing leaves normals good to 3 degrees
 _FEW = 8  # neighbours of a plane where those of `_PLANE` lie on both walls of a thin part, or on a bend
-_WORSE = 2.0  # times the spread off the plane of few neighbours: with more they lie on it no longer
 _ALONG_WALL = 0.9  # least cosine of both planes' normals
 _CLEAR = 2.5  # spacings from any edge, from where on planes are those of one face
 _SMOOTH = 4.0  # spacings from any edge, from where on a surface is seen to be smooth
@@ -95,8 +95,7 @@ def prepare(points: Any, edges: Edges | None, name: str) -> Prepared:
     discs = knn(index, index.at(index.evenly_sampled(2000)), k).distances[:, -1]
     spacing = float(np.sqrt(np.pi / k) * np.median(discs))
     size = float(np.linalg.norm(np.diff(np.quantile(xyz, (0.02, 0.98), axis=0), axis=0)))
-    points_each, most = _OF_LARGE
-    thinned = thin_to(xyz, int(np.clip(len(xyz) // points_each, MOST_SURFACE, most)), spacing)
+    thinned = thin_to(xyz, int(np.clip(len(xyz) // _POINTS_EACH, MOST_SURFACE, _MOST_OF_LARGE)), spacing)
     rows = finite.rows[order][thinned]
     planes = _planes_of_faces(cloud, rows)
     kept = np.isfinite(planes.offset)
@@ -128,7 +127,7 @@ def _planes_of_faces(cloud: Cloud, rows: np.ndarray) -> Normals:
     spread, least = (np.sqrt(p.residual / (k - 3)) for p, k in ((planes, _PLANE), (of_few, _FEW)))
     # Few points of a scan line lie on any plane through it.
     alike = np.abs((planes.normals * of_few.normals).sum(axis=1)) > _ALONG_WALL
-    worse = np.flatnonzero((spread > _WORSE * least) & alike)
+    worse = np.flatnonzero((spread > WORSE * least) & alike)
     planes.put(worse, of_few.take(worse))
     return planes
 

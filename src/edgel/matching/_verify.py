@@ -9,7 +9,7 @@ import numpy as np
 
 from edgel._kernels.parallel import kernel, run_slices
 from edgel.matching._grid import Grid, build_grid, find_cell
-from edgel.matching._half_edges import HalfEdges
+from edgel.matching._half_edges import MIN_FACING, HalfEdges
 from edgel.matching._sight import Sight, look
 
 _FRAME_COSINE = math.cos(math.radians(20.0))
@@ -22,7 +22,6 @@ _EDGES = 1.5  # weight of the edges' share against the surface's
 _MISSING = 2.5  # weight of creases where the other surface is seen to be smooth
 _THROUGH = 6.0  # and of surface that the sensor looked through: a true pose has next to none
 _NOTHING = 3.0  # and of surface that faces the sensor where it looked and got nothing
-_FACING = 0.25  # least cosine to the line of sight of a surface that has to return something
 
 
 class Probes(NamedTuple):
@@ -193,9 +192,9 @@ def _confirm(start, stop, poses, probes, field, tolerance, columns):
 
 @kernel
 def _faces(eye, x, y, z, n0, n1, n2):
-    """Tell whether a surface at a place faces a sensor's."""
+    """Tell whether a surface at a place faces a sensor's, by `MIN_FACING`."""
     dx, dy, dz = eye[0] - x, eye[1] - y, eye[2] - z
-    return n0 * dx + n1 * dy + n2 * dz > _FACING * math.sqrt(dx * dx + dy * dy + dz * dz)
+    return n0 * dx + n1 * dy + n2 * dz > MIN_FACING * math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
 def confirm(poses: np.ndarray, probes: Probes, field: Field, tolerance: float) -> np.ndarray:
