@@ -103,6 +103,21 @@ def test_rounded_corners_are_none(radius):
     assert curves.length.sum() > 60
 
 
+@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("radius", [5.0, 7.0])
+def test_rounded_corners_are_arcs_that_touch_their_lines(radius, seed):
+    """The lines beside them are longer, and would take an arc's points at both of its ends."""
+    places = rounded_block(radius, seed)
+    curves = trace(places, edgel.detect(places, min_strength=edgel.curves.FAINT))
+    arcs = np.flatnonzero(curves.kind == CurveKind.ARC)
+    top = arcs[curves.centre[arcs, 2] > 6]
+    assert (len(top), len(arcs)) == (4, 8)
+    np.testing.assert_allclose(curves.radius[top], radius, atol=0.15)
+    np.testing.assert_allclose(np.abs(curves.centre[top, :2]), np.tile([15.0, 11.0], (4, 1)) - radius, atol=0.3)
+    np.testing.assert_allclose(curves.length[top], 0.5 * np.pi * radius, atol=0.6)
+    assert not (curves.corners[:, 2] > 6).any()
+
+
 def test_order_of_points_and_threads_do_not_matter(block, monkeypatch):
     scene, edges = block
     before = trace(scene.cloud, edges)

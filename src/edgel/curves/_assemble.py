@@ -29,7 +29,8 @@ _ORDER = (EdgeKind.CREASE, EdgeKind.BOUNDARY, EdgeKind.OCCLUDING, EdgeKind.COLOR
 
 def assemble(strands: Strands, points: EdgePoints, edges: Edges, origin: np.ndarray, crs: str | None) -> Curves:
     """Make curves of strands."""
-    nodes = touch(strands, meet(ends_of(strands), strands.shape, strands.spacing))
+    strands = touch(strands)
+    nodes = meet(ends_of(strands), strands.shape, strands.spacing)
     noise = noise_of(strands, strands.spacing)
     nodes, through = meet_through(strands, without_unsure(nodes, noise, strands.spacing))
     nodes = without_passed(nodes, through, strands.shape, points.position, noise, strands.spacing)

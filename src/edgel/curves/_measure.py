@@ -64,6 +64,11 @@ class Measured:
         """Return some (int)."""
         return Measured(*(getattr(self, field.name)[kept] for field in fields(self)))
 
+    def put(self, which: np.ndarray, other: Measured) -> None:
+        """Write others in place of some (int)."""
+        for field in fields(self):
+            getattr(self, field.name)[which] = getattr(other, field.name)
+
     def and_(self, other: Measured) -> Measured:
         """Return these and others."""
         pairs = ((getattr(self, field.name), getattr(other, field.name)) for field in fields(self))

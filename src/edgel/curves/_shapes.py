@@ -12,12 +12,14 @@ from edgel.curves._claim import claim
 from edgel.curves._grow import grow
 from edgel.curves._measure import Measured, circles_through, mean_of, measure, nearly_straight, noise_of
 from edgel.curves._points import EdgePoints
-from edgel.curves._rows import take_rows
+from edgel.curves._rounds import with_rounds
+from edgel.curves._rows import rows_of, rows_of_runs, take_rows
 from edgel.curves._smooth import Smoothed, smooth
 from edgel.curves._split import Pieces, split
 from edgel.curves._straight import straighten
 
 _NOISY = 0.15  # spacings, of points about faces
+_OPEN = 1.5 * np.pi  # radians: an arc that goes round by more is as good as a circle
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,12 +57,16 @@ def find_shapes(points: EdgePoints) -> Shapes:
     if noise_of(first, spacing) > _NOISY:
         first, paths, spacing = _with_bends(first, paths, pieces.chain, points, smoothed.position)
     first = grow(first, paths, points, smoothed.position, spacing)
-    alive, owned, _ = _claimed(first, paths, spacing, smoothed, points)
+    alive, owned, owner = _claimed(first, paths, spacing, smoothed, points)
+    noise = noise_of(first, spacing)
+    begun, owned, is_round = with_rounds(first.take(alive), owned, owner, points, smoothed.position, noise)
     # Again, on all that each has now, and from a place that is right.
     spacing = mean_of(points.spacing, owned)
-    second = measure(points.index, first.shape[alive], owned, points, smoothed.position, spacing)
+    second = measure(points.index, begun.shape, owned, points, smoothed.position, spacing)
+    lost = np.flatnonzero(_lost_arcs(begun, second, is_round, noise))
+    second.put(lost, begun.take(lost))
     second = grow(second, owned, points, smoothed.position, spacing)
-    kept, owned, owner = _claimed(second, owned, spacing, smoothed, points)
+    kept, owned, owner = _claimed(second, owned, spacing, smoothed, points, is_round)
     second, spacing = second.take(kept), spacing[kept]
     runs, _ = _left(chains, owner >= 0)
     rough, apart, theirs = straighten(runs, points, smoothed, owner)
@@ -76,12 +82,26 @@ def _claimed(
     spacing: np.ndarray,
     smoothed: Smoothed,
     points: EdgePoints,
+    is_round: np.ndarray | None = None,
 ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray], np.ndarray]:
-    """Return which shapes have edge points left, these points, and the shape (E,) of each edge point; -1 for none."""
+    """Return which shapes have edge points left, these points, and which of those shapes has each (E,); -1 for none."""
     owner = np.full(len(points), -1)
-    claim(measured.shape, _surest_first(measured, spacing), rows, smoothed, points.spacing, owner)
+    order = _surest_first(measured, spacing)
+    if is_round is not None:  # lines that meet at a rounded corner would share its arc
+        order = order[np.argsort(~is_round[order], kind="stable")]
+    claim(measured.shape, order, measured.both, rows, smoothed, points.spacing, owner)
     alive = np.flatnonzero(np.bincount(owner[owner >= 0], minlength=len(spacing)) >= 3)
-    return alive, _rows_of(owner, alive, len(spacing)), owner
+    number = np.full(len(spacing) + 1, -1)
+    number[alive] = np.arange(len(alive))
+    return alive, rows_of(owner, alive, len(spacing)), number[owner]
+
+
+def _lost_arcs(first: Measured, second: Measured, is_round: np.ndarray, noise: float) -> np.ndarray:
+    """Tell which arcs were sure, and are not on what they have now: points of other curves are among it."""
+    arc = first.shape[:, RADIUS] > 0
+    open_ = first.ranges[:, 1] - first.ranges[:, 0] < _OPEN * first.shape[:, RADIUS]
+    sure = first.both & arc & open_ & ~second.holds & (noise <= _NOISY)
+    return sure | is_round & ~(second.holds & (second.shape[:, RADIUS] > 0))
 
 
 def _with_bends(
@@ -96,8 +116,7 @@ def _with_bends(
     Under noise pieces are cut where there is no border, and a short piece of a wide arc passes for a line.
     """
     runs = [rows[0][rows[1][k] : rows[1][k + number]] for number in (2, 3) for k in _following(chain, number)]
-    start = np.concatenate([[0], np.cumsum([len(run) for run in runs])]).astype(np.int64)
-    longer = np.concatenate([rows[0][:0], *runs]), start
+    longer = rows_of_runs(runs)
     spacing = mean_of(points.spacing, longer)
     bends = measure(points.index, circles_through(longer, position), longer, points, position, spacing)
     kept = np.flatnonzero(bends.both & (bends.shape[:, RADIUS] > 0) & ~nearly_straight(bends, spacing))
@@ -127,14 +146,6 @@ def _paths(chains: Chains, pieces: Pieces) -> tuple[np.ndarray, np.ndarray]:
     length = np.diff(chains.start)[pieces.chain][piece]
     at = pieces.start[piece] + np.arange(begin[-1]) - begin[piece]
     return chains.points[first + (at - first) % length], begin
-
-
-def _rows_of(owner: np.ndarray, alive: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the edge points of those shapes that are alive, and where each begins."""
-    order = np.argsort(owner, kind="stable")
-    order = order[owner[order] >= 0]
-    start = np.concatenate([[0], np.cumsum(np.bincount(owner[order], minlength=count))])
-    return take_rows((order, start), alive)
 
 
 def _left(chains: Chains, taken: np.ndarray) -> tuple[list[np.ndarray], list[bool]]:

@@ -11,7 +11,7 @@ from edgel.curves._claim import claim
 from edgel.curves._measure import Measured, lines_through, mean_of
 from edgel.curves._points import EdgePoints
 from edgel.curves._ranges import ranges_of
-from edgel.curves._rows import take_rows
+from edgel.curves._rows import rows_of_runs, take_rows
 from edgel.curves._smooth import Smoothed
 from edgel.curves._split import split
 
@@ -42,7 +42,7 @@ def straighten(
     length = np.diff(ranges_of(shape, rows, points.position))[:, 0] / mean_of(points.spacing, rows)
     order = np.lexsort((*shape[:, :3].T, -length))
     taken = np.where(owner >= 0, len(shape), -1)
-    claim(shape, order[length[order] > _LONG], rows, smoothed, points.spacing, taken)
+    claim(shape, order[length[order] > _LONG], np.zeros(len(shape), np.bool_), rows, smoothed, points.spacing, taken)
     mine = np.flatnonzero((taken >= 0) & (taken < len(shape)))
     mine = mine[np.argsort(taken[mine], kind="stable")]
     counts = np.bincount(taken[mine], minlength=len(shape))
@@ -56,12 +56,6 @@ def are_strong(rows: tuple[np.ndarray, np.ndarray], strength: np.ndarray) -> np.
     """Tell which sets of edge points (K,), given as rows and where each begins, are strong enough without faces."""
     largest = np.maximum.reduceat(strength[rows[0]], rows[1][:-1]) if len(rows[0]) else np.empty(0)
     return (mean_of(strength, rows) > _STRENGTH) & (largest >= _STRONGEST)
-
-
-def rows_of_runs(runs: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the edge points of all runs, and where each begins."""
-    start = np.concatenate([[0], np.cumsum([len(run) for run in runs])]).astype(np.int64)
-    return np.concatenate([np.empty(0, np.int64), *runs]), start
 
 
 def _as_measured(lines: np.ndarray, rows: tuple[np.ndarray, np.ndarray], position: np.ndarray) -> Measured:

@@ -1,4 +1,4 @@
-"""Lines that go smoothly over into arcs: their joints are where they touch, and no corners."""
+"""Lines that go smoothly over into arcs: both end where they touch."""
 
 from __future__ import annotations
 
@@ -6,40 +6,49 @@ from dataclasses import replace
 
 import numpy as np
 
+from edgel._neighbors.kdtree import build_index
+from edgel._neighbors.knn import knn
 from edgel.curves._circle import RADIUS
-from edgel.curves._corners import REACH, Nodes
-from edgel.curves._strands import Strands
+from edgel.curves._corners import REACH
+from edgel.curves._strands import Strands, along_of_all, ends_of, past
 
 _TOUCHING = 0.35  # spacings: a line that passes the centre at the radius, but for so much, touches the circle
 _ALONG = 0.1  # sine of the angle between a line and the plane of an arc that it touches
+_AROUND = 8  # ends about each that are tried
 
 
-def touch(strands: Strands, nodes: Nodes) -> Nodes:
-    """Move nodes of a line and an arc that touch to where they do.
+def touch(strands: Strands) -> Strands:
+    """Move ends of lines and arcs that touch to where they do.
 
     Near there both run side by side, and where their ends were found says little: an end a spacing too far along an arc
     of three turns by 20 degrees.
     """
-    ends = np.argwhere(nodes.of_end >= 0)
-    of = nodes.of_end[ends[:, 0], ends[:, 1]]
-    order = np.argsort(of, kind="stable")
-    counts = np.bincount(of, minlength=len(nodes.position))
-    first = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.int64)
-    pairs = np.flatnonzero(counts == 2)
-    a, b = (ends[order[first[pairs] + k], 0] for k in (0, 1))
     radius = strands.shape[:, RADIUS]
-    line, arc = np.where(radius[a] == 0, a, b), np.where(radius[a] == 0, b, a)
-    kept = (radius[line] == 0) & (radius[arc] > 0)
-    pairs, line, arc = pairs[kept], line[kept], arc[kept]
-    shape, round_ = strands.shape[line], strands.shape[arc]
-    direction = shape[:, 9:12]
-    offset = round_[:, :3] - shape[:, :3]
-    foot = shape[:, :3] + np.einsum("ij,ij->i", offset, direction)[:, None] * direction
-    distance = np.linalg.norm(round_[:, :3] - foot, axis=1)
-    h = strands.spacing[line]
-    touching = np.abs(distance - round_[:, RADIUS]) < _TOUCHING * h
-    touching &= np.abs(np.einsum("ij,ij->i", direction, round_[:, 9:12])) < _ALONG
-    touching &= np.linalg.norm(foot - nodes.position[pairs], axis=1) < REACH * h
-    position, is_corner = nodes.position.copy(), nodes.is_corner.copy()
-    position[pairs[touching]], is_corner[pairs[touching]] = foot[touching], False
-    return replace(nodes, position=position, is_corner=is_corner)
+    ends = ends_of(strands)
+    flat = np.flatnonzero(np.repeat(ends.is_open & ~strands.is_run, 2))
+    if len(flat) < 2:
+        return strands
+    places = ends.place.reshape(-1, 3)[flat]
+    near = knn(build_index(places), places, min(_AROUND, len(flat)))
+    a, b = np.repeat(flat, near.points.shape[1]), flat[near.points.ravel()]
+    kept = (radius[a // 2] == 0) & (radius[b // 2] > 0)
+    a, b = a[kept], b[kept]
+    line, arc = strands.shape[a // 2], strands.shape[b // 2]
+    direction, h = line[:, 9:12], strands.spacing[a // 2]
+    offset = arc[:, :3] - line[:, :3]
+    along = np.einsum("ij,ij->i", offset, direction)
+    foot = line[:, :3] + along[:, None] * direction
+    touching = np.abs(np.linalg.norm(arc[:, :3] - foot, axis=1) - arc[:, RADIUS]) < _TOUCHING * h
+    touching &= np.abs(np.einsum("ij,ij->i", direction, arc[:, 9:12])) < _ALONG
+    far = np.maximum(*(np.linalg.norm(ends.place.reshape(-1, 3)[end] - foot, axis=1) for end in (a, b)))
+    touching &= far < REACH * h
+    a, b, foot, along, far, arc = (part[touching] for part in (a, b, foot, along, far, arc))
+    moved, taken = strands.along.copy(), np.zeros(2 * len(strands), bool)
+    low = strands.along[b // 2, b % 2] - np.pi * arc[:, RADIUS]
+    on_arc = past(along_of_all(arc, foot), low, arc)
+    for k in np.lexsort((*foot.T, far)).tolist():  # the nearest first, each end once
+        if not (taken[a[k]] or taken[b[k]]):
+            taken[[a[k], b[k]]] = True
+            moved[a[k] // 2, a[k] % 2], moved[b[k] // 2, b[k] % 2] = along[k], on_arc[k]
+    good = moved[:, 0] < moved[:, 1]
+    return replace(strands, along=np.where(good[:, None], moved, strands.along))
