@@ -136,6 +136,21 @@ def test_a_pose_nearby_is_refined():
     assert off(answer.T_target_source, MOVED, part()) < 0.2
 
 
+@pytest.mark.parametrize("seed", [1, 5])
+def test_a_pose_nearby_does_not_slide_to_the_next_wedge(seed):
+    """From 7 degrees and 7 spacings off; what is refined from there alone ends four spacings off."""
+    solid = synth.wedge_fan()
+    spacing = 1.3 * solid.spacing
+    clouds = [synth.sample(solid, pattern="blue_noise", spacing=spacing, noise=0.3, seed=k).cloud.xyz for k in (0, 1)]
+    rng = np.random.default_rng(seed)
+    way, axis = rng.normal(size=(2, 3))
+    middle = clouds[0].mean(axis=0)
+    start = pose(turn(axis, 7), 7 * spacing * way / np.linalg.norm(way))
+    start[:3, 3] += middle - start[:3, :3] @ middle
+    answer = edgel.register(*clouds, initial=start)
+    assert off(answer.T_target_source, np.eye(4), clouds[0]) < 0.3
+
+
 def test_edges_that_were_found_before_are_taken():
     source, target = part(0), apply(MOVED, part(1))
     edges = [edgel.detect(points, orient="outward") for points in (source, target)]

@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from edgel._stages import Stages
-from edgel.matching._open import covariance_of, free_directions_of
+from edgel.matching._open import covariance_of, free_directions_of, moved_by
 from edgel.matching._prepare import Prepared
 from edgel.matching._refine import middle_of, radius_of
 from edgel.matching._registration import Poses, Registration, not_found
-from edgel.matching._search import END, Found, Match, has_more_edges, search
+from edgel.matching._search import END, REACH, Found, Match, has_more_edges, search
 from edgel.matching._symmetry import same_answers
 from edgel.matching._verify import EDGE, MISSING, SURFACE, VISIBLE
 
 SURE = 0.1
 """Margin from which on an answer can be relied on: `docs/matching.md` says how often such answers are right."""
 _LEAST_SCORE, _LEAST_FIT, _LEAST_AGREEMENT, _LEAST_OVERLAP = 0.15, 0.4, 0.1, 0.4
-_LEAST_GIVEN = 0.05  # score of a pose that was given, and not found among others
+_LEAST_GIVEN = 0.03  # score of a pose that was given, and not found among others
 _FAR = (0.5, 0.25)  # of the score, and at least: as far behind as that is out of the question
 _ORDERS = 15.0  # spacings of either cloud that the other has to be large
 _FEWEST_PLACES = 30
@@ -44,11 +44,17 @@ def register_prepared(
         if initial is None:
             found, method = _searched(match, end)
         else:
-            found, method = match.verified(match.refined(initial[None], end)[0]), "initial"
+            found, method = match.verified(match.refined(_around(match, initial), end)[0]), "initial"
     if not len(found.poses):
         return not_found("no pose was proposed: neither edges nor surfaces look alike", stages.seconds)
     with stages("answer"):
         return _answer(match, found, swapped, end, stages, method, symmetries)
+
+
+def _around(match: Match, pose: np.ndarray) -> np.ndarray:
+    """Return a pose, and those a reach of matches beside it: what is as far off may slide to a neighbour instead."""
+    steps = REACH * match.spacing * np.eye(6)
+    return np.array([pose, *(moved_by(match, pose, sign * step) for step in steps for sign in (1, -1))])
 
 
 def _searched(match: Match, end: float) -> tuple[Found, str]:
@@ -82,7 +88,7 @@ def _answer(
     margin = margin_of(found, float(others.max(initial=0.0)))
     turned = found.poses if not swapped else np.linalg.inv(found.poses)
     alternatives = Poses(turned[1:], found.scores[1:])
-    doubt = _doubt(found, margin, _LEAST_GIVEN if method == "initial" else _LEAST_SCORE)
+    doubt = _doubt(found, margin, given=method == "initial")
     if doubt:
         return not_found(doubt, stages.seconds, Poses(turned, found.scores))
     _, information, residuals = match.refined(pose[None], end)
@@ -153,14 +159,17 @@ def margin_of(found: Found, other: float) -> float:
     return agreement(found) * float(np.clip((score - other) / max(_FAR[0] * score, _FAR[1]), 0, 1))
 
 
-def _doubt(found: Found, margin: float, least: float = _LEAST_SCORE) -> str:
-    """Say why the best pose is not believed; empty if it is."""
+def _doubt(found: Found, margin: float, *, given: bool = False) -> str:
+    """Say why the best pose is not believed; empty if it is. What was given is not asked whether others do as well."""
     score, fitness = float(found.scores[0]), _fitness(found)
     if fitness < _LEAST_FIT:
         there = f"{fitness:.0%} of the surface lie where it should, {_LEAST_FIT:.0%} is asked"
         return f"no pose is confirmed: the best lets {there}"
+    least = _LEAST_GIVEN if given else _LEAST_SCORE
     if score < least:
         return f"no pose is confirmed by edges and surface: the best scores {score:.2f}, {least:g} is asked"
+    if given:
+        return ""
     if agreement(found) < _LEAST_AGREEMENT:
         return "no pose is confirmed: creases contradict the best about as often as they confirm it"
     overlap = found.columns[0, 0, SURFACE]
