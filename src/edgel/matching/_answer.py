@@ -33,7 +33,7 @@ def register_prepared(
     symmetries: np.ndarray | None = None,
 ) -> Registration:
     """Find where a prepared source lies in a prepared target."""
-    obstacle = _obstacle(source, target)
+    obstacle = _obstacle(source, target, given=initial is not None)
     if obstacle:
         return not_found(obstacle, stages.seconds)
     with stages("search"):
@@ -120,8 +120,8 @@ def _answer(
     )
 
 
-def _obstacle(source: Prepared, target: Prepared) -> str:
-    """Say why two clouds cannot be compared at all; empty if they can."""
+def _obstacle(source: Prepared, target: Prepared, *, given: bool) -> str:
+    """Say why two clouds cannot be compared at all; empty if they can, as planes from a pose that is given."""
     for side, other, name, its in ((source, target, "source", "target's"), (target, source, "target", "source's")):
         if side.size < _ORDERS * other.spacing:
             return (
@@ -130,7 +130,7 @@ def _obstacle(source: Prepared, target: Prepared) -> str:
             )
         if len(side.surface) < _FEWEST_PLACES:
             return f"the {name} has too little surface: {len(side.surface)} places of it lie on a plane"
-        if not side.half.is_crease.any() and _is_plane(side):
+        if not given and not side.half.is_crease.any() and _is_plane(side):
             return f"the {name} is one plane without a crease, which fits anywhere on another"
     return ""
 

@@ -19,6 +19,7 @@ from edgel._objects import NORMALS
 from edgel._range_image import without_no_return
 from edgel.cloud import Cloud, as_cloud, check_points
 from edgel.edges import EdgeKind, Edges
+from edgel.matching._cut_walls import without_cut_walls
 from edgel.matching._half_edges import HalfEdges, of_edges
 from edgel.matching._sight import Sight, build_sight, empty_rays, no_sight
 
@@ -94,6 +95,7 @@ def prepare(points: Any, edges: Edges | None, name: str) -> Prepared:
     k = min(16, len(xyz))
     discs = knn(index, index.at(index.evenly_sampled(2000)), k).distances[:, -1]
     spacing = float(np.sqrt(np.pi / k) * np.median(discs))
+    sure = without_cut_walls(edges, xyz, index, spacing) if cloud.viewpoint is None else edges
     size = float(np.linalg.norm(np.diff(np.quantile(xyz, (0.02, 0.98), axis=0), axis=0)))
     thinned = thin_to(xyz, int(np.clip(len(xyz) // _POINTS_EACH, MOST_SURFACE, _MOST_OF_LARGE)), spacing)
     rows = finite.rows[order][thinned]
@@ -102,7 +104,7 @@ def prepare(points: Any, edges: Edges | None, name: str) -> Prepared:
     normals, places = planes.normals[kept], xyz[thinned][kept]
     places = places - ((places * normals).sum(axis=1) - planes.offset[kept])[:, None] * normals
     away = away_from(places, edges.position, _SMOOTH * spacing)
-    half = of_edges(edges, places, normals, spacing, cloud.viewpoint)
+    half = of_edges(sure, places, normals, spacing, cloud.viewpoint)
     half = half.take(np.lexsort((*half.frames.reshape(-1, 9).T, *half.places.T)))
     clear = away > _CLEAR * spacing
     clear |= clear.sum() < _FEWEST
