@@ -156,7 +156,7 @@ def test_one_plane_is_refined_where_it_may_not_be_searched():
         rng = np.random.default_rng(seed)
         plan = rng.uniform(0, 1, (6000, 2)) * [60, 40]
         plan = plan[synth.poisson_disc(np.c_[plan, np.zeros(len(plan))], 0.75)]
-        return Cloud(np.c_[plan, rng.normal(0, 0.2, len(plan))], viewpoint=[30.0, 20, 200])
+        return Cloud(np.c_[plan, rng.normal(0, 0.2, len(plan))], viewpoint=np.array([30.0, 20, 200]))
 
     near = pose(turn((0, 0, 1), 3), (2, 1.5, 1))
     anywhere = edgel.register(sheet(0), sheet(1))
