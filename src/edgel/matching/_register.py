@@ -36,7 +36,8 @@ def register(
     target : the same but a Model
         In the same unit. Clouds with a viewpoint (`Cloud.viewpoint`) tell more: their sensor saw where nothing is.
     initial : (4, 4) array_like, optional
-        T_target_source to begin from, within about 5 degrees and 5 spacings; nothing else is tried then.
+        T_target_source to begin from, within about 5 degrees and 5 spacings; nothing else is tried then but poses 4
+        spacings beside it, and whether creases contradict the best of them is not asked.
     source_edges, target_edges : Edges, optional
         What `edgel.detect` found in them; default: it is asked, for clouds of which no sensor is known with
         ``orient="outward"``.
