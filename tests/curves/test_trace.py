@@ -116,6 +116,7 @@ def test_rounded_corners_are_arcs_that_touch_their_lines(radius, seed):
     np.testing.assert_allclose(np.abs(curves.centre[top, :2]), np.tile([15.0, 11.0], (4, 1)) - radius, atol=0.3)
     np.testing.assert_allclose(curves.length[top], 0.5 * np.pi * radius, atol=0.6)
     assert not (curves.corners[:, 2] > 6).any()
+    assert (curves.length_std[top] < 0.6).all()  # where they touch is as sure as the arc
 
 
 def test_order_of_points_and_threads_do_not_matter(block, monkeypatch):

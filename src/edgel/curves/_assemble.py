@@ -15,7 +15,7 @@ from edgel.curves._loops import find_loops
 from edgel.curves._measure import noise_of
 from edgel.curves._points import EdgePoints
 from edgel.curves._strands import Strands, along_of_all, ends_of, past
-from edgel.curves._tangent import touch
+from edgel.curves._tangent import touch, with_joints
 from edgel.curves._through import meet_through
 from edgel.edges import EdgeKind, Edges
 
@@ -29,8 +29,8 @@ _ORDER = (EdgeKind.CREASE, EdgeKind.BOUNDARY, EdgeKind.OCCLUDING, EdgeKind.COLOR
 
 def assemble(strands: Strands, points: EdgePoints, edges: Edges, origin: np.ndarray, crs: str | None) -> Curves:
     """Make curves of strands."""
-    strands = touch(strands)
-    nodes = meet(ends_of(strands), strands.shape, strands.spacing)
+    strands, touching = touch(strands)
+    nodes = with_joints(strands, meet(ends_of(strands), strands.shape, strands.spacing), touching)
     noise = noise_of(strands, strands.spacing)
     nodes, through = meet_through(strands, without_unsure(nodes, noise, strands.spacing))
     nodes = without_passed(nodes, through, strands.shape, points.position, noise, strands.spacing)

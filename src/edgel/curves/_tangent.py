@@ -8,8 +8,9 @@ import numpy as np
 
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import knn
+from edgel.curves import _fit
 from edgel.curves._circle import RADIUS
-from edgel.curves._corners import REACH
+from edgel.curves._corners import REACH, Nodes
 from edgel.curves._strands import Strands, along_of_all, ends_of, past
 
 _TOUCHING = 0.35  # spacings: a line that passes the centre at the radius, but for so much, touches the circle
@@ -17,8 +18,8 @@ _ALONG = 0.1  # sine of the angle between a line and the plane of an arc that it
 _AROUND = 8  # ends about each that are tried
 
 
-def touch(strands: Strands) -> Strands:
-    """Move ends of lines and arcs that touch to where they do.
+def touch(strands: Strands) -> tuple[Strands, np.ndarray]:
+    """Move ends of lines and arcs that touch to where they do, and tell which ends (N, 2) those are.
 
     Near there both run side by side, and where their ends were found says little: an end a spacing too far along an arc
     of three turns by 20 degrees.
@@ -27,7 +28,7 @@ def touch(strands: Strands) -> Strands:
     ends = ends_of(strands)
     flat = np.flatnonzero(np.repeat(ends.is_open & ~strands.is_run, 2))
     if len(flat) < 2:
-        return strands
+        return strands, np.zeros((len(strands), 2), bool)
     places = ends.place.reshape(-1, 3)[flat]
     near = knn(build_index(places), places, min(_AROUND, len(flat)))
     a, b = np.repeat(flat, near.points.shape[1]), flat[near.points.ravel()]
@@ -50,5 +51,16 @@ def touch(strands: Strands) -> Strands:
         if not (taken[a[k]] or taken[b[k]]):
             taken[[a[k], b[k]]] = True
             moved[a[k] // 2, a[k] % 2], moved[b[k] // 2, b[k] % 2] = along[k], on_arc[k]
-    good = moved[:, 0] < moved[:, 1]
-    return replace(strands, along=np.where(good[:, None], moved, strands.along))
+    good = (moved[:, 0] < moved[:, 1])[:, None]
+    return replace(strands, along=np.where(good, moved, strands.along)), taken.reshape(-1, 2) & good
+
+
+def with_joints(strands: Strands, nodes: Nodes, touching: np.ndarray) -> Nodes:
+    """Say of nodes at which ends that touch meet how sure they are: as the arc is, which says where along the line.
+
+    The planes of both leave that open.
+    """
+    ends = touching & (nodes.of_end >= 0) & (strands.shape[:, RADIUS] > 0)[:, None]
+    std = nodes.std.copy()
+    std[nodes.of_end[ends]] = np.repeat(strands.fit[:, _fit.POSITION_STD, None], 2, axis=1)[ends]
+    return replace(nodes, std=np.fmin(std, nodes.std))
