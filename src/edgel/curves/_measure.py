@@ -33,7 +33,20 @@ _SAGITTA = 1.5  # spacings: an arc that rises less may be a line
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class _Attempt:
+    shape: np.ndarray
+    fit: np.ndarray
+    covariance: np.ndarray
+    ranges: np.ndarray
+
+    def put(self, which: np.ndarray, other: _Attempt, rows: np.ndarray) -> None:
+        """Write some rows of others in place of some (int), as far as the others know."""
+        for field in fields(other):
+            getattr(self, field.name)[which] = getattr(other, field.name)[rows]
+
+
+@dataclass(frozen=True, eq=False)
+class Measured(_Attempt):
     """Shapes moved to where their faces meet.
 
     Attributes
@@ -49,10 +62,6 @@ class Measured:
         Whether its faces confirm it.
     """
 
-    shape: np.ndarray
-    fit: np.ndarray
-    covariance: np.ndarray
-    ranges: np.ndarray
     holds: np.ndarray
 
     @property
@@ -63,11 +72,6 @@ class Measured:
     def take(self, kept: np.ndarray) -> Measured:
         """Return some (int)."""
         return Measured(*(getattr(self, field.name)[kept] for field in fields(self)))
-
-    def put(self, which: np.ndarray, other: Measured) -> None:
-        """Write others in place of some (int)."""
-        for field in fields(self):
-            getattr(self, field.name)[which] = getattr(other, field.name)
 
     def and_(self, other: Measured) -> Measured:
         """Return these and others."""
@@ -107,8 +111,7 @@ def measure(
         better = holds & (
             ~good[which] | (straight & (_rough(other) < 1.15 * _rough(best)[which] + 0.02 * spacing[which]))
         )
-        for name in ("shape", "fit", "covariance", "ranges"):
-            getattr(best, name)[which[better]] = getattr(other, name)[better]
+        best.put(which[better], other, better)
         good[which[better]] = True
     return Measured(best.shape, best.fit, best.covariance, ranges_of(best.shape, rows, position), good)
 
@@ -129,17 +132,8 @@ def refit(
     noise = noise_of(measured, spacing)
     better = _holds(other, noise, spacing[which], np.zeros(len(which), bool))
     better &= _rough(other) < 1.15 * _rough(measured)[which] + 0.02 * spacing[which]
-    for name in ("shape", "fit", "covariance", "ranges"):
-        getattr(measured, name)[which[better]] = getattr(other, name)[better]
+    measured.put(which[better], other, better)
     return better
-
-
-@dataclass(frozen=True, eq=False)
-class _Attempt:
-    shape: np.ndarray
-    fit: np.ndarray
-    covariance: np.ndarray
-    ranges: np.ndarray
 
 
 def _attempt(
@@ -161,7 +155,7 @@ def _attempt(
     return _Attempt(shape, fit, covariance, ranges[which].copy())
 
 
-def _rough(fitted: _Attempt | Measured) -> np.ndarray:
+def _rough(fitted: _Attempt) -> np.ndarray:
     return np.nan_to_num(fitted.fit[:, _fit.SIGMA : _fit.SIGMA + 2], nan=np.inf).max(axis=1)
 
 
@@ -171,7 +165,7 @@ def noise_of(fitted: Any, spacing: np.ndarray) -> float:
     return float(np.median(fitted.fit[both, _fit.SIGMA : _fit.SIGMA + 2] / spacing[both, None])) if both.any() else 0.0
 
 
-def nearly_straight(fitted: _Attempt | Measured, spacing: np.ndarray) -> np.ndarray:
+def nearly_straight(fitted: _Attempt, spacing: np.ndarray) -> np.ndarray:
     """Tell which arcs (K,) are so short that lines may be meant."""
     radius = fitted.shape[:, RADIUS]
     length = fitted.ranges[:, 1] - fitted.ranges[:, 0]

@@ -111,7 +111,7 @@ def _find_arcs(
         on_arc = np.abs(np.arctan2(y, x)) < math.pi / 2 - half[k]
         mine = every[on_arc & (offsets_of(arc[None], position[every]) < max(_NEAR * h[k], 10 * floor[k]))]
         shares = np.bincount(owner[mine][owner[mine] >= 0], minlength=len(spacing))
-        shares[is_arc | np.isin(np.arange(len(spacing)), pairs[k])] = 0
+        shares[is_arc] = shares[pairs[k].tolist()] = 0
         absorbs = (shares > _OWN * np.diff(rows[1])).any()
         if gain[k] > (_ABSORBING if absorbs else _GAIN):
             arcs.append(arc)

@@ -64,7 +64,7 @@ def find_shapes(points: EdgePoints) -> Shapes:
     spacing = mean_of(points.spacing, owned)
     second = measure(points.index, begun.shape, owned, points, smoothed.position, spacing)
     lost = np.flatnonzero(_lost_arcs(begun, second, is_round, noise))
-    second.put(lost, begun.take(lost))
+    second.put(lost, begun, lost)
     second = grow(second, owned, points, smoothed.position, spacing)
     kept, owned, owner = _claimed(second, owned, spacing, smoothed, points, is_round)
     second, spacing = second.take(kept), spacing[kept]

@@ -17,14 +17,15 @@ from edgel.curves._rows import rows_of_runs, take_rows
 from edgel.curves._shapes import Shapes
 from edgel.curves._straight import are_strong
 
-_SURE = 1.1  # logarithm of the odds that a shape is an edge
-_TOTAL, _MEAN, _LONG, _OTHERS = 2.6, 1.3, 0.5, 2.8
+_LIKELY = 1.1  # logarithm of the odds that a shape is an edge
+_TOTAL, _MEAN, _LONG = 2.6, 1.3, 0.5
 """How much each says of that: logarithms of the edge points' strength a spacing, their mean one, and the length."""
+_ADDED = 2.8  # to them
 _TURN, _FACES = 1.2, -2.1
 """And faces: the logarithm of the turn between them in its deviations, and that there are two."""
 _FAINT, _NO_TURN, _CLEAR_TURN = 0.02, 0.1, 1e3  # strength, and deviations: less, or more, says no more
 _RUN_POINTS = 4
-_SUREST = 0.02  # spacings: no face is surer
+_SURE = 0.02  # spacings: no face is surer
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +126,7 @@ def _evident(
         turns = np.log(np.clip(turn / fit[:, _fit.ANGLE_STD], _NO_TURN, _CLEAR_TURN))
     faces = np.where(fit[:, _fit.STATE] == _fit.MEASURED, _TURN * turns + _FACES, 0.0)
     points = _TOTAL * np.log(total / length + _FAINT) + _MEAN * np.log(total / number + _FAINT)
-    return points + _LONG * np.log(length) + faces + _OTHERS > _SURE
+    return points + _LONG * np.log(length) + faces + _ADDED > _LIKELY
 
 
 def along_of_all(shape: np.ndarray, places: np.ndarray) -> np.ndarray:
@@ -196,5 +197,5 @@ def planes_at(
     normals = faces[..., :1] * first[:, None] + faces[..., 1:] * second[:, None]
     off = np.where(line, fit[:, _fit.OFFSETS : _fit.OFFSETS + 2], fit[:, _fit.POSITION_STD, None])
     swing = np.where(is_line, along * fit[:, _fit.TURN_STD], 0.0)
-    std = np.sqrt(off**2 + swing[:, None] ** 2 + (_SUREST * h[:, None]) ** 2)
+    std = np.sqrt(off**2 + swing[:, None] ** 2 + (_SURE * h[:, None]) ** 2)
     return on_shapes(shape, along), tangent, normals, np.where(np.isfinite(std), std, 0.3 * h[:, None])

@@ -11,7 +11,8 @@ from edgel._neighbors.knn import knn
 from edgel.curves import _fit
 from edgel.curves._circle import RADIUS
 from edgel.curves._corners import REACH, Nodes
-from edgel.curves._strands import Strands, along_of_all, ends_of, past
+from edgel.curves._gather import on_shapes
+from edgel.curves._strands import Strands, along_of_all, past
 
 _TOUCHING = 0.35  # spacings: a line that passes the centre at the radius, but for so much, touches the circle
 _ALONG = 0.1  # sine of the angle between a line and the plane of an arc that it touches
@@ -25,15 +26,15 @@ def touch(strands: Strands) -> tuple[Strands, np.ndarray]:
     of three turns by 20 degrees.
     """
     radius = strands.shape[:, RADIUS]
-    ends = ends_of(strands)
-    flat = np.flatnonzero(np.repeat(ends.is_open & ~strands.is_run, 2))
+    flat = np.flatnonzero(np.repeat(~strands.closed & ~strands.is_run, 2))
     if len(flat) < 2:
         return strands, np.zeros((len(strands), 2), bool)
-    places = ends.place.reshape(-1, 3)[flat]
+    places = on_shapes(strands.shape[flat // 2], strands.along.ravel()[flat])
     near = knn(build_index(places), places, min(_AROUND, len(flat)))
-    a, b = np.repeat(flat, near.points.shape[1]), flat[near.points.ravel()]
-    kept = (radius[a // 2] == 0) & (radius[b // 2] > 0)
-    a, b = a[kept], b[kept]
+    one, two = np.repeat(np.arange(len(flat)), near.points.shape[1]), near.points.ravel()
+    kept = (radius[flat[one] // 2] == 0) & (radius[flat[two] // 2] > 0)
+    one, two = one[kept], two[kept]
+    a, b = flat[one], flat[two]
     line, arc = strands.shape[a // 2], strands.shape[b // 2]
     direction, h = line[:, 9:12], strands.spacing[a // 2]
     offset = arc[:, :3] - line[:, :3]
@@ -41,7 +42,7 @@ def touch(strands: Strands) -> tuple[Strands, np.ndarray]:
     foot = line[:, :3] + along[:, None] * direction
     touching = np.abs(np.linalg.norm(arc[:, :3] - foot, axis=1) - arc[:, RADIUS]) < _TOUCHING * h
     touching &= np.abs(np.einsum("ij,ij->i", direction, arc[:, 9:12])) < _ALONG
-    far = np.maximum(*(np.linalg.norm(ends.place.reshape(-1, 3)[end] - foot, axis=1) for end in (a, b)))
+    far = np.maximum(*(np.linalg.norm(places[end] - foot, axis=1) for end in (one, two)))
     touching &= far < REACH * h
     a, b, foot, along, far, arc = (part[touching] for part in (a, b, foot, along, far, arc))
     moved, taken = strands.along.copy(), np.zeros(2 * len(strands), bool)

@@ -23,10 +23,10 @@ def without_cut_walls(edges: Edges, xyz: np.ndarray, index: NeighborIndex, spaci
     crease = np.flatnonzero(told & ((edges.kind & EdgeKind.CREASE) > 0) & (edges.convex != 0))
     if len(crease) < _MEAN:
         return edges
-    fewer = _fewer_points(edges.take(crease), xyz, index, spacing)
-    near = knn(build_index(edges.position[crease]), edges.position[crease], _MEAN)
-    direction = edges.direction[crease]
-    alike = np.abs(np.einsum("ei,eki->ek", direction, direction[near.points])) > _ALIKE
+    creases = edges.take(crease)
+    fewer = _fewer_points(creases, xyz, index, spacing)
+    near = knn(build_index(creases.position), creases.position, _MEAN)
+    alike = np.abs(np.einsum("ei,eki->ek", creases.direction, creases.direction[near.points])) > _ALIKE
     alike &= near.distances < _ALONG * spacing
     mean = (fewer[near.points] * alike).sum(axis=1) / alike.sum(axis=1)
     kept = np.ones(len(edges), bool)
