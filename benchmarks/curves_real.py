@@ -13,7 +13,7 @@ from scipy.spatial import KDTree
 
 import edgel
 from edgel import synth
-from edgel.curves import FAINT, Curves, trace
+from edgel.curves import FAINT, Curves, right_angles, trace
 
 
 def run(data: Path, real: Path) -> dict[str, Any]:
@@ -30,11 +30,15 @@ def run(data: Path, real: Path) -> dict[str, Any]:
 
 def sampled(first: np.ndarray, last: np.ndarray, step: float) -> np.ndarray:
     """Places along segments (S, 3), so far apart."""
-    parts = [np.empty((0, first.shape[1]))]
-    for a, b in zip(first, last, strict=True):
-        count = max(int(np.linalg.norm(b - a) / step), 1)
-        parts.append(a + ((np.arange(count) + 0.5) / count)[:, None] * (b - a))
-    return np.concatenate(parts)
+    return places_along(first, last, step)[0]
+
+
+def places_along(first: np.ndarray, last: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Places along segments (S, D), so far apart, and the segment of each."""
+    number = np.maximum((np.linalg.norm(last - first, axis=1) / step).astype(np.int64), 1)
+    owner = np.repeat(np.arange(len(number)), number)
+    at = (np.arange(len(owner)) - np.repeat(np.cumsum(number) - number, number) + 0.5) / number[owner]
+    return first[owner] + at[:, None] * (last - first)[owner], owner
 
 
 def segments(curves: Curves) -> tuple[np.ndarray, np.ndarray]:
@@ -100,26 +104,34 @@ def spacing_of(xyz: np.ndarray) -> float:
 
 
 def sides(folder: Path) -> dict[str, float]:
-    """Share of the length of surveyed sides of buildings with a line within 0.4 m in plan and 3 degrees."""
+    """Surveyed sides of buildings: share covered by lines as they are, and by those turned to right angles."""
     cloud = edgel.read(next(folder.glob("*.laz")))
     curves = trace(cloud, edgel.detect(cloud, min_strength=FAINT))
-    first, last = (ends[:, :2] for ends in segments(curves))
-    height = 0.5 * (segments(curves)[0][:, 2] + segments(curves)[1][:, 2])
-    length = np.linalg.norm(last - first, axis=1)
+    surveyed = json.loads((folder / "step_edges.json").read_text())
+    turned = {f"right_angles_{d}": covered(surveyed, right_angles(curves, np.radians(d))) for d in (5, 10)}
+    return {"covered": covered(surveyed, curves), **turned, "curves": len(curves)}
+
+
+def covered(surveyed: list[dict[str, Any]], curves: Curves) -> float:
+    """Share of the length of sides with a line within 0.4 m in plan and 3 degrees, nearer to the roof than the ground."""
+    first, last = segments(curves)
+    length = np.linalg.norm((last - first)[:, :2], axis=1)
     long = length > 0.05
-    first, last, height, length = first[long], last[long], height[long], length[long]
-    direction = (last - first) / length[:, None]
-    covered = total = 0
-    for side in json.loads((folder / "step_edges.json").read_text()):
+    first, last, length = first[long], last[long], length[long]
+    direction = (last - first)[:, :2] / length[:, None]
+    height = 0.5 * (first + last)[:, 2]
+    there, owner = places_along(first[:, :2], last[:, :2], 0.1)
+    tree = KDTree(there)
+    hits = total = 0
+    for side in surveyed:
         a, b = np.array(side["a"]), np.array(side["b"])
         along = (b - a) / np.linalg.norm(b - a)
-        alike = np.abs(direction @ along) > np.cos(np.radians(3))
-        alike &= height > side.get("z_roof_low", -np.inf) - 0.5
-        asked = sampled(a[None], b[None], 0.1)
-        total += len(asked)
-        if alike.any():
-            covered += int((KDTree(sampled(first[alike], last[alike], 0.1)).query(asked)[0] <= 0.4).sum())
-    return {"covered": covered / total, "curves": len(curves)}
+        # A steep roof ends far below its lowest return inside: the middle of the step tells it from the ground.
+        good = (np.abs(direction @ along) > np.cos(np.radians(3))) & (height > side["z_out"] + 0.5 * side["jump"])
+        near = tree.query_ball_point(sampled(a[None], b[None], 0.1), 0.4)
+        hits += sum(bool(good[owner[which]].any()) for which in near)
+        total += len(near)
+    return hits / total
 
 
 def truth(folder: Path) -> dict[str, dict[str, float]]:

@@ -65,3 +65,41 @@ def test_lines_that_are_off_by_more_stay(sheet):
         right_angles(sheet, 2.0)
     none = replace(sheet, kind=np.full(4, edgel.curves.CurveKind.POLYLINE, np.uint8))
     np.testing.assert_array_equal(right_angles(none, 0.1).vertices, sheet.vertices)
+
+
+def test_a_line_that_meets_nothing_is_turned_as_those_beside_it(sheet):
+    nodes, vertices = sheet.nodes.copy(), sheet.vertices.copy()
+    nodes[0] = -1
+    ends = [sheet.start[0], sheet.start[1] - 1]
+    middle, turn = vertices[ends].mean(axis=0), np.radians(6)
+    matrix = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
+    vertices[ends] = middle + (vertices[ends] - middle) @ matrix.T
+    square = right_angles(replace(sheet, nodes=nodes, vertices=vertices), np.radians(9))
+    angle = np.degrees(np.arctan2(square.direction[:, 1], square.direction[:, 0])) % 90
+    np.testing.assert_allclose(angle, angle[1], atol=1)  # of 6: it counts among them, too
+    np.testing.assert_allclose(square.vertices[ends].mean(axis=0), middle)  # about its middle
+
+
+def test_lines_far_away_turn_nothing(sheet):
+    """The same outline again, turned by 7 degrees and 25 spacings beside it, has a main direction of its own."""
+    turn = np.radians(7)
+    matrix = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
+    shift = np.array([120.0, 0, 0])
+    names = ("vertices", "node_position")
+    turned = {name: getattr(sheet, name) @ matrix.T + shift for name in names} | {
+        "direction": sheet.direction @ matrix.T
+    }
+    alone, other = (right_angles(each, np.radians(10)) for each in (sheet, replace(sheet, **turned)))
+    both = right_angles(_side_by_side(sheet, replace(sheet, **turned)), np.radians(10))
+    np.testing.assert_allclose(both.vertices, np.concatenate([alone.vertices, other.vertices]), atol=1e-9)
+
+
+def _side_by_side(one: edgel.curves.Curves, other: edgel.curves.Curves) -> edgel.curves.Curves:
+    number = len(one.node_position)
+    joined = {
+        name: np.concatenate([getattr(one, name), getattr(other, name)])
+        for name in ("kind", "vertices", "length", "direction", "node_position", "spacing")
+    }
+    joined["start"] = np.concatenate([one.start, one.start[-1] + other.start[1:]])
+    joined["nodes"] = np.concatenate([one.nodes, np.where(other.nodes >= 0, other.nodes + number, -1)])
+    return replace(one, **joined)

@@ -7,9 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from edgel._kernels.union_find import join
+from edgel._neighbors.kdtree import build_index
+from edgel._neighbors.knn import knn
 from edgel.curves._curves import CurveKind, Curves
 
 _FREE = 1e-6  # weight of where a node was, over that of a line through it
+_NEIGHBORS, _REACH = 32, 20.0  # lines that tell a main direction; spacings within which they lie
+_JOINED = 5.0  # weight of lines that nodes join with the one that is turned, over that of others as long
+_ALIKE = np.radians(2)  # main directions of lines that nodes join: nearer ones are one
 _ROUNDS, _STRAY = 5, np.radians(4)  # of the robust mean of directions
 _STEEP = 0.9  # of a direction's rise: lines as steep have no direction in plan
 
@@ -17,8 +22,9 @@ _STEEP = 0.9  # of a direction's rise: lines as steep have no direction in plan
 def right_angles(curves: Curves, within: float) -> Curves:
     """Turn lines in plan to the main direction of their neighbours, or across it, where they nearly lie so.
 
-    For outlines of buildings. The lines that are joined by nodes are one group; its main direction is their robust
-    mean, the longer the surer, right angles counted as none. A line turns about its middle, heights stay, and nodes
+    For outlines of buildings. The main direction is the one that most of the lines within 20 spacings agree on, the
+    longer the surer and those that nodes join with the line before others, right angles counted as none: eaves of a few
+    points are turned by what walls and ridges beside them say. A line turns about its middle, heights stay, and nodes
     move to where the turned lines meet. Arcs, circles and polylines stay; lengths become those of the turned lines,
     other measures stay.
 
@@ -42,13 +48,9 @@ def right_angles(curves: Curves, within: float) -> Curves:
     middle, way = 0.5 * (first + last), last - first
     plan = np.hypot(way[:, 0], way[:, 1])
     angle = np.arctan2(way[:, 1], way[:, 0])
-    group = _groups(curves.nodes[lines], len(curves.node_position))
-    weight, off = plan**3, np.zeros(len(plan))  # the variance of a direction goes down with the third power
-    for _ in range(_ROUNDS):
-        sure = weight / (1.0 + (off / _STRAY) ** 2)
-        x, y = np.bincount(group, sure * np.cos(4 * angle)), np.bincount(group, sure * np.sin(4 * angle))
-        off = angle - 0.25 * np.arctan2(y, x)[group]
-        off -= 0.5 * np.pi * np.round(off / (0.5 * np.pi))
+    joined = _joined(curves.nodes[lines], plan)
+    main = _main_directions(middle, plan, angle, join(len(lines), *joined), curves.spacing[lines])
+    off = _quarter(angle - _shared(main, plan, joined))
     angle = np.where(np.abs(off) <= within, angle - off, angle)
     turned = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     position = _meeting_places(curves, lines, middle[:, :2], turned)
@@ -67,10 +69,61 @@ def right_angles(curves: Curves, within: float) -> Curves:
     return replace(curves, vertices=vertices, length=length, direction=direction, node_position=nodes)
 
 
-def _groups(nodes: np.ndarray, count: int) -> np.ndarray:
-    """Number the groups of lines (L,) that share nodes (L, 2) of `count`."""
+def _main_directions(
+    middle: np.ndarray, plan: np.ndarray, angle: np.ndarray, group: np.ndarray, spacing: np.ndarray
+) -> np.ndarray:
+    """Return the main direction beside each of some lines (L,), by their middles (L, 3), lengths and angles in plan.
+
+    The neighbour's direction that the others agree with most, then the robust mean about it: a mean of all would lie
+    between two buildings that stand askew.
+    """
+    if not len(plan):
+        return angle
+    places = middle - middle.mean(axis=0)
+    near = knn(build_index(places), places, min(_NEIGHBORS, len(plan)))
+    apart = near.distances - 0.5 * plan[near.points]
+    rows = np.arange(len(plan))
+    joined = (group[near.points] == group[:, None]) & (near.points != rows[:, None])
+    weight = np.where(apart < _REACH * spacing[:, None], np.where(joined, _JOINED, 1.0) * plan[near.points] ** 2, 0.0)
+    theirs = angle[near.points]
+    agreeing = np.stack([_mean(theirs, weight, theirs[:, k])[1] for k in range(theirs.shape[1])], axis=1)
+    main = theirs[rows, agreeing.argmax(axis=1)]
+    for _ in range(_ROUNDS):
+        main, _ = _mean(theirs, weight, main)
+    return main
+
+
+def _mean(angle: np.ndarray, weight: np.ndarray, main: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the mean (L,) of angles (L, K) about main directions (L,), less of those farther off, and their weight."""
+    off = _quarter(angle - main[:, None])
+    weight = weight / (1.0 + (off / _STRAY) ** 2)
+    total = weight.sum(axis=1)
+    return main + (weight * off).sum(axis=1) / total, total
+
+
+def _quarter(angle: np.ndarray) -> np.ndarray:
+    """Return angles less whole right angles, within 45 degrees of zero."""
+    return angle - 0.5 * np.pi * np.round(angle / (0.5 * np.pi))
+
+
+def _joined(nodes: np.ndarray, plan: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return pairs of lines (L,) that share a node, of (L, 2): each with the longest there."""
     line, end = np.nonzero(nodes >= 0)
-    return join(len(nodes) + count, line, len(nodes) + nodes[line, end])[: len(nodes)]
+    node = nodes[line, end]
+    order = np.lexsort((line, -plan[line], node))
+    first = order[np.searchsorted(node[order], node)]
+    return line, line[first]
+
+
+def _shared(main: np.ndarray, plan: np.ndarray, joined: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """Return the main directions of lines (L,): those that nodes join share one where theirs nearly agree."""
+    line, other = joined
+    alike = np.abs(_quarter(main[line] - main[other])) < _ALIKE
+    group = join(len(main), line[alike], other[alike])
+    _, first, group = np.unique(group, return_index=True, return_inverse=True)
+    off = _quarter(main - main[first][group])
+    weight = plan**2
+    return main[first][group] + (np.bincount(group, weight * off) / np.bincount(group, weight))[group]
 
 
 def _meeting_places(curves: Curves, lines: np.ndarray, middle: np.ndarray, way: np.ndarray) -> np.ndarray:
