@@ -8,7 +8,7 @@ import numpy as np
 
 from edgel.curves import _fit
 from edgel.curves._circle import RADIUS, locals_of
-from edgel.curves._corners import Nodes, meet, without_passed, without_unsure
+from edgel.curves._corners import Nodes, corners_of_shapes, meet, without_passed, without_unsure
 from edgel.curves._curves import CurveKind, Curves
 from edgel.curves._gather import on_shapes
 from edgel.curves._loops import find_loops
@@ -34,6 +34,7 @@ def assemble(strands: Strands, points: EdgePoints, edges: Edges, origin: np.ndar
     noise = noise_of(strands, strands.spacing)
     nodes, through = meet_through(strands, without_unsure(nodes, noise, strands.spacing))
     nodes = without_passed(nodes, through, strands.shape, points.position, noise, strands.spacing)
+    nodes = corners_of_shapes(nodes, through, strands.is_run)
     strands = end_at_nodes(strands, nodes)
     kept = np.flatnonzero(_long_enough(strands, nodes))
     number = np.full(len(strands), -1)

@@ -126,6 +126,16 @@ def without_passed(
     return _without(nodes, (uses + np.bincount(through[:, 0], minlength=len(h)) == 2) & passed)
 
 
+def corners_of_shapes(nodes: Nodes, through: np.ndarray, is_run: np.ndarray) -> Nodes:
+    """Call no joint a corner at which fewer than two curves with a shape meet: where runs end says little of where.
+
+    Takes which curves (T, 2) pass through which nodes, and which curves (N,) bool are runs of edge points.
+    """
+    shaped = np.where(is_run[:, None], -1, nodes.of_end)
+    node = np.concatenate([shaped[shaped >= 0], through[:, 0]])
+    return replace(nodes, is_corner=nodes.is_corner & (np.bincount(node, minlength=len(nodes.position)) >= 2))
+
+
 def _uses(nodes: Nodes, spacing: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return how many curves end at each node, (M,) int64, and their mean spacing (M,)."""
     count, meeting = len(nodes.position), nodes.of_end >= 0

@@ -12,6 +12,8 @@ from edgel.curves._circle import RADIUS, SHAPE, locals_of
 from edgel.curves._corners import Ends
 from edgel.curves._extent import extents
 from edgel.curves._gather import on_shapes
+from edgel.curves._leftover import leftover_paths
+from edgel.curves._measure import mean_of
 from edgel.curves._points import EdgePoints
 from edgel.curves._rows import rows_of_runs, take_rows
 from edgel.curves._shapes import Shapes
@@ -25,6 +27,7 @@ _TURN, _FACES = 1.2, -2.1
 """And faces: the logarithm of the turn between them in its deviations, and that there are two."""
 _FAINT, _NO_TURN, _CLEAR_TURN = 0.02, 0.1, 1e3  # strength, and deviations: less, or more, says no more
 _RUN_POINTS = 4
+_STEP = 0.5  # spacings between the places of strands that edge points lie beside
 _SURE = 0.02  # spacings: no face is surer
 
 
@@ -72,6 +75,23 @@ class Strands:
         parts = {name: getattr(self, name)[kept] for name in names}
         return replace(self, rows=(self.rows[0][rows], start), places=self.places[rows], **parts)
 
+    def and_runs(self, runs: list[tuple[np.ndarray, bool]], position: np.ndarray, spacing: np.ndarray) -> Strands:
+        """Add runs of edge points, and whether each is closed, given the places (E, 3) and spacing (E,) of all."""
+        number = len(runs)
+        fit = np.full((number, _fit.FIT), np.nan)
+        fit[:, _fit.STATE] = _fit.NONE
+        rows, start = rows_of_runs([run for run, _ in runs])
+        return Strands(
+            np.concatenate([self.shape, np.full((number, SHAPE), np.nan)]),
+            np.concatenate([self.fit, fit]),
+            np.concatenate([self.covariance, np.zeros((number, _fit.UNKNOWNS, _fit.UNKNOWNS))]),
+            np.concatenate([self.along, np.zeros((number, 2))]),
+            np.concatenate([self.closed, np.array([is_closed for _, is_closed in runs], bool)]),
+            np.concatenate([self.spacing, mean_of(spacing, (rows, start))]),
+            (np.concatenate([self.rows[0], rows]), np.concatenate([self.rows[1], self.rows[1][-1] + start[1:]])),
+            np.concatenate([self.places, position[rows]]),
+        )
+
     def path_of(self, strand: int) -> np.ndarray:
         """Return the places of the edge points of a strand, (P, 3)."""
         return self.places[self.rows[1][strand] : self.rows[1][strand + 1]]
@@ -92,23 +112,29 @@ def find_strands(shapes: Shapes, points: EdgePoints) -> Strands:
         for run, is_closed, is_strong in zip(shapes.runs, shapes.run_closed, strong, strict=True)
         if len(run) >= _RUN_POINTS and is_strong
     ]
-    number = len(runs)
-    none = np.full((number, _fit.FIT), np.nan)
-    none[:, _fit.STATE] = _fit.NONE
-    lines = np.full((number, SHAPE), np.nan)
-    every = np.concatenate([rows, *(run for run, _ in runs)]).astype(np.int64)
-    counts = [len(run) for run, _ in runs]
-    spacing = [float(points.spacing[run].mean()) for run, _ in runs]
-    return Strands(
-        np.concatenate([measured.shape[on], lines]),
-        np.concatenate([measured.fit[on], none]),
-        np.concatenate([measured.covariance[on], np.zeros((number, _fit.UNKNOWNS, _fit.UNKNOWNS))]),
-        np.concatenate([ends, np.zeros((number, 2))]),
-        np.concatenate([closed, np.array([is_closed for _, is_closed in runs], bool)]),
-        np.concatenate([shapes.spacing[on], np.array(spacing)]),
-        (every, np.concatenate([start, start[-1] + np.cumsum(counts)]).astype(np.int64)),
-        position[every],
-    )
+    spacing = shapes.spacing[on]
+    parts = measured.shape[on], measured.fit[on], measured.covariance[on], ends, closed, spacing
+    strands = Strands(*parts, (rows, start), position[rows]).and_runs(runs, position, points.spacing)
+    passed = places_on(strands, np.arange(len(on)), _STEP)[0]
+    beside = [place for run in range(len(on), len(strands)) for place in _between(strands.path_of(run))]
+    passed = np.concatenate([passed, *beside])
+    paths = leftover_paths(position, points.strength, points.kind, points.spacing, passed)
+    return strands.and_runs([(path, False) for path in paths], position, points.spacing)
+
+
+def _between(path: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the places of a path, and those midway between them."""
+    return path, 0.5 * (path[1:] + path[:-1])
+
+
+def places_on(strands: Strands, which: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return places on some strands with shapes, so many spacings apart, the strand of each and how far along it is."""
+    span = strands.along[which, 1] - strands.along[which, 0]
+    number = np.maximum(np.ceil(span / (step * strands.spacing[which])), 1).astype(np.int64)
+    at = np.repeat(np.arange(len(which)), number)
+    share = (np.arange(len(at)) - np.repeat(np.cumsum(number) - number, number) + 0.5) / number[at]
+    owner, along = which[at], strands.along[which[at], 0] + share * span[at]
+    return on_shapes(strands.shape[owner], along), owner, along
 
 
 def _evident(

@@ -9,8 +9,7 @@ import numpy as np
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import knn
 from edgel.curves._corners import PRIOR, REACH, Nodes
-from edgel.curves._gather import on_shapes
-from edgel.curves._strands import Strands, ends_of, planes_at
+from edgel.curves._strands import Strands, ends_of, places_on, planes_at
 
 _STEP = 0.5  # spacings between the places of curves that are looked at
 _AROUND = 12
@@ -28,16 +27,7 @@ def meet_through(strands: Strands, nodes: Nodes) -> tuple[Nodes, np.ndarray]:
     free = np.flatnonzero(((nodes.of_end < 0) & ends.is_open[:, None]).ravel())
     if not len(free) or not len(shaped):
         return nodes, np.empty((0, 2), np.int64)
-    number = np.maximum(
-        np.ceil((strands.along[shaped, 1] - strands.along[shaped, 0]) / (_STEP * strands.spacing[shaped])), 1
-    )
-    owner = np.repeat(shaped, number.astype(np.int64))
-    first = np.concatenate([[0], np.cumsum(number)[:-1]]).astype(np.int64)
-    step = (np.arange(len(owner)) - np.repeat(first, number.astype(np.int64)) + 0.5) / np.repeat(
-        number, number.astype(np.int64)
-    )
-    along = strands.along[owner, 0] + step * (strands.along[owner, 1] - strands.along[owner, 0])
-    places = on_shapes(strands.shape[owner], along)
+    places, owner, along = places_on(strands, shaped, _STEP)
     curve, end = free // 2, free % 2
     at = ends.place[curve, end]
     near = knn(build_index(places), at, min(_AROUND, len(places)))
