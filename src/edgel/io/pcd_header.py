@@ -43,7 +43,7 @@ class Header:
 def read_header(path: str, file: BinaryIO) -> Header:
     """Read the header and leave the file where the data begins; FormatError if there is none or it is broken."""
     entries: dict[str, list[str]] = {}
-    num_lines, head = 0, b""
+    num_lines, head = 0, bytearray()  # bytes would be copied with each line
     while "DATA" not in entries:
         line = file.readline(1 << 16)
         head += line
@@ -57,10 +57,10 @@ def read_header(path: str, file: BinaryIO) -> Header:
         if len(head) > LONGEST_HEADER:
             break
     if not re.match(rb"\s*(#\s*\.PCD|#|VERSION\s|FIELDS\s|COLUMNS\s)", head, re.IGNORECASE) or not entries:
-        wrong_magic(path, "a PCD file (it has no PCD header)", head + file.read(512))
+        wrong_magic(path, "a PCD file (it has no PCD header)", bytes(head) + file.read(512))
     if "DATA" not in entries:
         raise FormatError(f"{path}: the PCD header breaks off at line {num_lines}, before DATA; get the file again")
-    return replace(_parse_header(path, entries, num_lines), shift=_parse_shift(path, head))
+    return replace(_parse_header(path, entries, num_lines), shift=_parse_shift(path, bytes(head)))
 
 
 def _parse_shift(path: str, head: bytes) -> tuple[float, float, float] | None:
