@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from edgel.curves._corners import Nodes, corners_of_shapes
 from edgel.curves._leftover import leftover_paths
 
 NOTHING = np.empty((0, 3))
@@ -61,3 +62,12 @@ def test_two_points_are_no_path_and_unlike_kinds_are_not_linked():
     position, kind = row(12), np.where(np.arange(12) < 6, 1, 8).astype(np.uint8)
     halves = leftover_paths(position, np.ones(12), kind, np.ones(12), NOTHING)
     assert sorted(sorted(path.tolist()) for path in halves) == [list(range(6)), list(range(6, 12))]
+
+
+def test_a_corner_has_two_curves_with_shapes():
+    nodes = Nodes(np.zeros((3, 3)), np.zeros(3), np.array([True, True, False]), np.array([[0, 1], [0, 2], [1, 2]]))
+    is_run = np.array([False, False, True])
+    found = corners_of_shapes(nodes, np.empty((0, 2), np.int64), is_run)
+    assert found.is_corner.tolist() == [True, False, False]
+    assert corners_of_shapes(nodes, np.array([[1, 1]]), is_run).is_corner.tolist() == [True, True, False]
+    np.testing.assert_array_equal(found.of_end, nodes.of_end)

@@ -11,11 +11,11 @@ from edgel._kernels.union_find import find_root
 from edgel._neighbors.kdtree import build_index
 from edgel._neighbors.knn import knn
 
-STRENGTH = 0.65  # of the edge points that are linked: fainter ones scatter beside edges, and in crowns of trees
+_STRENGTH = 0.65  # of the edge points that are linked: fainter ones scatter beside edges, and in crowns of trees
 _PASSED = 1.5  # spacings from a strand: its own edge, or one that cannot be told from it
 _REACH, _AROUND = 1.6, 7  # spacings between linked points; points, each itself among them, that one may link to
-_ONWARD = 0.3  # cosine of the turn of a path at most
-POINTS = 3
+_ONWARD = 0.3  # cosine between a step of a path and the next, at least
+_POINTS = 3  # of a path at least
 
 
 def leftover_paths(
@@ -26,11 +26,11 @@ def leftover_paths(
     The nearest are linked first, each with two others at most, and no path turns back: Kruskal's tree with the degree
     bounded, since what runs here is a line and has no branches.
     """
-    sure = np.flatnonzero(strength >= STRENGTH)
+    sure = np.flatnonzero(strength >= _STRENGTH)
     if len(passed) and len(sure):
         away = knn(build_index(passed), position[sure], 1).distances[:, 0]
         sure = sure[away >= _PASSED * spacing[sure]]
-    if len(sure) < POINTS:
+    if len(sure) < _POINTS:
         return []
     sure = sure[np.lexsort(position[sure].T)]
     places = position[sure]
@@ -43,7 +43,7 @@ def leftover_paths(
     order, start = np.empty(len(sure), np.int64), np.zeros(len(sure) + 1, np.int64)
     count = _link(pairs, places, order, start)
     paths = (order[start[k] : start[k + 1]] for k in range(count))
-    return [sure[path] for path in paths if len(path) >= POINTS]
+    return [sure[path] for path in paths if len(path) >= _POINTS]
 
 
 @kernel

@@ -120,10 +120,10 @@ def _shared(main: np.ndarray, plan: np.ndarray, joined: tuple[np.ndarray, np.nda
     line, other = joined
     alike = np.abs(_quarter(main[line] - main[other])) < _ALIKE
     group = join(len(main), line[alike], other[alike])
-    _, first, group = np.unique(group, return_index=True, return_inverse=True)
-    off = _quarter(main - main[first][group])
+    first = main[np.unique(group, return_index=True)[1]][group]
+    off = _quarter(main - first)
     weight = plan**2
-    return main[first][group] + (np.bincount(group, weight * off) / np.bincount(group, weight))[group]
+    return first + (np.bincount(group, weight * off) / np.bincount(group, weight))[group]
 
 
 def _meeting_places(curves: Curves, lines: np.ndarray, middle: np.ndarray, way: np.ndarray) -> np.ndarray:

@@ -27,7 +27,7 @@ _TURN, _FACES = 1.2, -2.1
 """And faces: the logarithm of the turn between them in its deviations, and that there are two."""
 _FAINT, _NO_TURN, _CLEAR_TURN = 0.02, 0.1, 1e3  # strength, and deviations: less, or more, says no more
 _RUN_POINTS = 4
-_STEP = 0.5  # spacings between the places of strands that edge points lie beside
+_STEP = 0.5  # spacings between the places of curves that are looked at
 _SURE = 0.02  # spacings: no face is surer
 
 
@@ -115,22 +115,21 @@ def find_strands(shapes: Shapes, points: EdgePoints) -> Strands:
     spacing = shapes.spacing[on]
     parts = measured.shape[on], measured.fit[on], measured.covariance[on], ends, closed, spacing
     strands = Strands(*parts, (rows, start), position[rows]).and_runs(runs, position, points.spacing)
-    passed = places_on(strands, np.arange(len(on)), _STEP)[0]
-    beside = [place for run in range(len(on), len(strands)) for place in _between(strands.path_of(run))]
-    passed = np.concatenate([passed, *beside])
-    paths = leftover_paths(position, points.strength, points.kind, points.spacing, passed)
+    paths = leftover_paths(position, points.strength, points.kind, points.spacing, _places_along(strands))
     return strands.and_runs([(path, False) for path in paths], position, points.spacing)
 
 
-def _between(path: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the places of a path, and those midway between them."""
-    return path, 0.5 * (path[1:] + path[:-1])
+def _places_along(strands: Strands) -> np.ndarray:
+    """Return places along all strands; of runs their edge points, and midway between them."""
+    shaped, runs = np.flatnonzero(~strands.is_run), np.flatnonzero(strands.is_run)
+    paths = [strands.path_of(run) for run in runs.tolist()]
+    return np.concatenate([places_on(strands, shaped)[0], *paths, *(0.5 * (path[1:] + path[:-1]) for path in paths)])
 
 
-def places_on(strands: Strands, which: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return places on some strands with shapes, so many spacings apart, the strand of each and how far along it is."""
+def places_on(strands: Strands, which: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return places on some strands with shapes, the strand of each, and how far along it is."""
     span = strands.along[which, 1] - strands.along[which, 0]
-    number = np.maximum(np.ceil(span / (step * strands.spacing[which])), 1).astype(np.int64)
+    number = np.maximum(np.ceil(span / (_STEP * strands.spacing[which])), 1).astype(np.int64)
     at = np.repeat(np.arange(len(which)), number)
     share = (np.arange(len(at)) - np.repeat(np.cumsum(number) - number, number) + 0.5) / number[at]
     owner, along = which[at], strands.along[which[at], 0] + share * span[at]

@@ -11,7 +11,6 @@ from edgel._neighbors.knn import knn
 from edgel.curves._corners import PRIOR, REACH, Nodes
 from edgel.curves._strands import Strands, ends_of, places_on, planes_at
 
-_STEP = 0.5  # spacings between the places of curves that are looked at
 _AROUND = 12
 _ALIKE = 0.64  # cosine between tangents: more alike, one curve goes over into the other
 _ASIDE = 0.5  # spacings: farther from the other curve is no end on it
@@ -27,7 +26,7 @@ def meet_through(strands: Strands, nodes: Nodes) -> tuple[Nodes, np.ndarray]:
     free = np.flatnonzero(((nodes.of_end < 0) & ends.is_open[:, None]).ravel())
     if not len(free) or not len(shaped):
         return nodes, np.empty((0, 2), np.int64)
-    places, owner, along = places_on(strands, shaped, _STEP)
+    places, owner, along = places_on(strands, shaped)
     curve, end = free // 2, free % 2
     at = ends.place[curve, end]
     near = knn(build_index(places), at, min(_AROUND, len(places)))
